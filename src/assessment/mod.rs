@@ -1,0 +1,31 @@
+//! What one pipeline found in one recording: series, summary, quality, provenance. Values only, no behaviour of HTTP
+//! or of a database.
+
+pub mod joint_angles;
+pub mod provenance;
+pub mod quality;
+pub mod series;
+pub mod settings;
+
+pub use joint_angles::AngleChannel;
+pub use provenance::Provenance;
+pub use quality::{Event, Quality, Warning};
+pub use series::{ChannelSummary, Series};
+pub use settings::{JointAngleSettings, Method, Settings};
+
+/// One pipeline's result on one recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessment {
+    /// The pipeline, for example `joint_angles`.
+    pub pipeline: &'static str,
+    /// Time of each sample on the recording's clock, nanoseconds.
+    pub time_ns: Vec<i64>,
+    /// The estimated series, all as long as `time_ns`.
+    pub series: Vec<Series>,
+    /// One line per series.
+    pub summary: Vec<ChannelSummary>,
+    /// How far the result can be trusted.
+    pub quality: Quality,
+    /// What is needed to compute the same bytes again.
+    pub provenance: Provenance,
+}

@@ -1,0 +1,91 @@
+//! How far a result can be trusted.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Quality block of an assessment.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct Quality {
+    /// Frames in the recording.
+    pub n_frames: u64,
+    /// Time from the first to the last frame, seconds.
+    pub duration_s: f64,
+    /// Median time between frames, seconds.
+    pub median_interval_s: f64,
+    /// Longest time between two frames, seconds.
+    pub longest_gap_s: f64,
+    /// Share of frames in which every joint of the model was seen, 0 to 1.
+    pub coverage: f64,
+    /// Effective number of particles, when the method has particles.
+    pub effective_sample_size: Option<EffectiveSampleSize>,
+    /// How segment lengths were found.
+    pub calibration: Option<CalibrationQuality>,
+    /// What the reader should know; each has a stable code.
+    pub warnings: Vec<Warning>,
+    /// What happened when.
+    pub events: Vec<Event>,
+}
+
+/// Effective sample size of a particle filter, in particles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EffectiveSampleSize {
+    /// Particles in use.
+    pub particles: u32,
+    /// Median over the frames.
+    pub median: f64,
+    /// Smallest of all frames.
+    pub min: f64,
+}
+
+/// How segment lengths were found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct CalibrationQuality {
+    /// `static_window` or `whole_recording`.
+    pub source: String,
+    /// First and last second of the static window, when there is one.
+    pub window_s: Option<[f64; 2]>,
+    /// Frames that were used.
+    pub n_frames: u64,
+    /// Segment lengths.
+    pub segments: Vec<SegmentLength>,
+}
+
+/// Length of one body segment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SegmentLength {
+    /// Segment, for example `left_thigh`.
+    pub segment: String,
+    /// Robust mean length, metres.
+    pub length_m: f64,
+    /// Robust standard deviation over the frames used, metres.
+    pub spread_m: f64,
+}
+
+/// Something the reader should know.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Warning {
+    /// Stable code, for example `no_static_window`.
+    pub code: String,
+    /// One sentence for a person.
+    pub message: String,
+}
+
+impl Warning {
+    /// A warning with a stable code.
+    pub fn new(code: &str, message: impl Into<String>) -> Self {
+        Self { code: code.to_owned(), message: message.into() }
+    }
+}
+
+/// Something that happened during a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Event {
+    /// Kind, for example `joint_lost`.
+    pub kind: String,
+    /// What it concerns, for example `left_knee`.
+    pub subject: String,
+    /// First second.
+    pub start_s: f64,
+    /// Last second.
+    pub end_s: f64,
+}

@@ -1,0 +1,67 @@
+//! What can be asked of a pipeline. Settings stand with the result because they are part of its provenance, and because
+//! whoever asks for an assessment need not know the pipeline.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// How joint angles are estimated. All methods share one body model and one form of result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The default: iterated extended Kalman filter with robust weights and a backward pass over the recording.
+    Smoother,
+    /// The paper's particle filter: prior as the proposal, multinomial resampling at every frame, mean as estimate.
+    Paper,
+    /// Closed geometry, frame by frame.
+    Ik,
+    /// The middleware's own rotations, with 180° axial flips undone.
+    Nite,
+}
+
+impl Method {
+    /// Every method, the default first.
+    pub const ALL: [Method; 4] = [Method::Smoother, Method::Paper, Method::Ik, Method::Nite];
+
+    /// Name in settings, tables and provenance.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Smoother => "smoother",
+            Method::Paper => "paper",
+            Method::Ik => "ik",
+            Method::Nite => "nite",
+        }
+    }
+}
+
+/// Which pipeline runs, and how. In JSON an object whose `pipeline` names it: `{"pipeline": "joint_angles"}`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "pipeline", rename_all = "snake_case")]
+pub enum Settings {
+    /// Joint angles from skeleton positions.
+    JointAngles(JointAngleSettings),
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings::JointAngles(JointAngleSettings::default())
+    }
+}
+
+/// Settings of the joint-angle pipeline; every field has a default.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct JointAngleSettings {
+    /// How angles are estimated.
+    pub method: Method,
+    /// Particles of the `paper` method, 16 to 65536; the paper compares 128, 512 and 2048.
+    #[schema(minimum = 16, maximum = 65536)]
+    pub particles: u32,
+    /// Seed of the random streams.
+    pub seed: u64,
+}
+
+impl Default for JointAngleSettings {
+    fn default() -> Self {
+        Self { method: Method::Smoother, particles: 512, seed: 1 }
+    }
+}

@@ -1,0 +1,1 @@
+//! Filters that know no body: state-space models in, estimates out.

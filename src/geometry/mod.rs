@@ -1,0 +1,7 @@
+//! Geometry: rotations of rigid bodies. Knows nothing of bodies, sensors or time.
+//!
+//! A rotation is a [`nalgebra::UnitQuaternion`] or [`nalgebra::Rotation3`]; its *attitude vector* is the
+//! rotation vector (unit axis × angle, radians).
+
+pub mod attitude;
+pub mod euler;

@@ -1,0 +1,3 @@
+//! The `surefoot` binary.
+
+fn main() {}

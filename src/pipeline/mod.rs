@@ -1,0 +1,49 @@
+//! From a recording to an assessment: pure computation, no clock, no storage, no HTTP.
+
+pub mod joint_angles;
+
+use crate::assessment::{Assessment, Settings};
+use crate::progress::{Cancelled, Monitor};
+use crate::recording::Recording;
+
+/// Why a recording has no assessment.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PipelineError {
+    /// Somebody asked to stop.
+    #[error("the work was cancelled")]
+    Cancelled,
+    /// The recording cannot be assessed by this pipeline.
+    #[error("{sentence}")]
+    Unsuitable {
+        /// Stable, documented code, for example `handedness_mismatch`.
+        code: &'static str,
+        /// Where in the recording, for example `frames[17]`.
+        place: Option<String>,
+        /// One sentence for a person that also says what to record differently.
+        sentence: String,
+    },
+}
+
+impl PipelineError {
+    /// A recording that cannot be assessed.
+    pub fn unsuitable(code: &'static str, sentence: impl Into<String>) -> Self {
+        Self::Unsuitable { code, place: None, sentence: sentence.into() }
+    }
+}
+
+impl From<Cancelled> for PipelineError {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}
+
+/// Runs the pipeline that the settings name. The recording's digest is added to the provenance by the caller.
+///
+/// # Errors
+/// [`PipelineError::Unsuitable`] says what the recording lacks; [`PipelineError::Cancelled`] when the monitor was
+/// asked to stop.
+pub fn assess(recording: &Recording, settings: &Settings, monitor: &Monitor) -> Result<Assessment, PipelineError> {
+    match settings {
+        Settings::JointAngles(settings) => joint_angles::assess(recording, settings, monitor),
+    }
+}

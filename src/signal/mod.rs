@@ -1,0 +1,1 @@
+//! Time series: interpolation, alignment of clocks, stillness.

@@ -1,0 +1,1 @@
+//! The worker: claim a job, load its recording, assess, save.
