@@ -25,14 +25,12 @@ pub(super) fn shape(posture: &mut Posture, subject: &Subject, active: ActiveTime
     for (side, start, forward) in starts {
         let (u, end) = ((t - start) / step, start + step);
         let placed = between(start, end, t);
-        let flight = pulse([start, start + 0.2 * step], [end - 0.2 * step, end], t);
         let shift = pulse([start - 0.3, start + 0.15 * step], [end - 0.15 * step, end + 0.3], t);
         let leg = &mut posture.legs[side as usize];
         leg.ankle.x += forward * placed;
         leg.ankle.z += (outward(side) * HALF_WIDTH_M - leg.ankle.z) * placed;
         let inside = u.clamp(0.0, 1.0);
-        leg.ankle.y += CLEARANCE_M * (4.0 * inside * (1.0 - inside)).powi(3);
-        leg.support = 1.0 - flight;
+        leg.ankle.y += CLEARANCE_M * (4.0 * inside * (1.0 - inside)).powi(4);
         posture.pelvis[1] -= outward(side) * 0.03 * shift;
     }
     let settled = between(first, first + step, t);

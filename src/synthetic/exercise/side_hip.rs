@@ -12,7 +12,7 @@ const ABDUCTION_DEG: f64 = 32.0;
 /// Lean of the trunk to the standing side.
 const LEAN_DEG: f64 = 6.0;
 /// Way of the pelvis over the standing leg, metres.
-const SHIFT_M: f64 = 0.05;
+const SHIFT_M: f64 = 0.04;
 
 pub(super) fn shape(posture: &mut Posture, subject: &Subject, active: ActiveTime, t: f64) {
     let schedule = Schedule::filling(active.start_s, active.end_s, PERIOD_S * subject.slowness);

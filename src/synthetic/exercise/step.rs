@@ -17,8 +17,6 @@ const CLEARANCE_M: f64 = 0.10;
 const SHIFT_M: f64 = 0.035;
 /// The swing onto the step and the swing back, shares of the repetition.
 const SWINGS: [[f64; 2]; 2] = [[0.10, 0.40], [0.66, 0.96]];
-/// Share of a swing in which the foot takes or gives up its load.
-const LOADING: f64 = 0.2;
 
 pub(super) fn shape(posture: &mut Posture, subject: &Subject, active: ActiveTime, t: f64) {
     let schedule = Schedule::filling(active.start_s, active.end_s, PERIOD_S * subject.slowness);
@@ -42,19 +40,14 @@ pub(super) fn shape(posture: &mut Posture, subject: &Subject, active: ActiveTime
 
     let leg = &mut posture.legs[side as usize];
     leg.ankle.x += reach * place;
-    leg.ankle.y += RISE_M * place + CLEARANCE_M * amplitude * SWINGS.iter().map(|swing| arch(*swing, phase)).sum::<f64>();
-    leg.support = 1.0 - SWINGS.iter().map(|swing| flight(*swing, phase)).sum::<f64>();
+    leg.ankle.y +=
+        RISE_M * place + CLEARANCE_M * amplitude * SWINGS.iter().map(|swing| arch(*swing, phase)).sum::<f64>();
     leg.axial -= (2.0 * place).to_radians();
 }
 
-/// Smooth arch of height 1 over an interval, at rest at both ends.
+/// Smooth arch of height 1 over an interval. It begins so gently because a nearly straight knee must bend as the square
+/// root of the way its ankle comes up.
 fn arch([start, end]: [f64; 2], phase: f64) -> f64 {
     let u = ((phase - start) / (end - start)).clamp(0.0, 1.0);
-    (4.0 * u * (1.0 - u)).powi(3)
-}
-
-/// 1 while the foot is in the air, 0 while it stands.
-fn flight([start, end]: [f64; 2], phase: f64) -> f64 {
-    let loading = LOADING * (end - start);
-    pulse([start, start + loading], [end - loading, end], phase)
+    (4.0 * u * (1.0 - u)).powi(4)
 }

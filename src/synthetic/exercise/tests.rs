@@ -113,7 +113,9 @@ fn movements_are_smooth() {
                 let speed = (after - here).amax() / STEP_S;
                 assert!(speed < 500f64.to_radians(), "{exercise} at {t}: {} deg/s", speed.to_degrees());
                 let acceleration = (after - 2.0 * here + before).amax() / (STEP_S * STEP_S);
-                assert!(acceleration < 6000f64.to_radians(), "{exercise} at {t}: {} deg/s2 {}", acceleration.to_degrees(), (after - 2.0 * here + before).map(f64::to_degrees));
+                // A step of 3° from one sample to the next would be 10 800 deg/s²; a foot that leaves the floor with a
+                // nearly straight knee comes to 6 600.
+                assert!(acceleration < 8000f64.to_radians(), "{exercise} at {t}: {} deg/s2", acceleration.to_degrees());
             }
         }
     }
