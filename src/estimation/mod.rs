@@ -5,5 +5,6 @@
 
 pub mod particle_filter;
 pub mod random;
+pub mod rate_smoother;
 pub mod resampling;
 pub mod weights;

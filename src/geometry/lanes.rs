@@ -44,8 +44,8 @@ fn nearest_integer(x: f32) -> f32 {
 pub fn sin_cos(x: &Lanes) -> (Lanes, Lanes) {
     // π/2 split so that quadrant × part is exact in f32 for the quadrants in range.
     const PART_1: f32 = 1.570_312_5;
-    const PART_2: f32 = 4.837_512_969_970_703e-4;
-    const PART_3: f32 = 7.549_789_948_768_648e-8;
+    const PART_2: f32 = 4.837_513e-4;
+    const PART_3: f32 = 7.549_79e-8;
     let (mut sine, mut cosine) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         let quadrant = nearest_integer(x[i] * std::f32::consts::FRAC_2_PI);

@@ -182,7 +182,8 @@ fn check_handedness(observations: &Observations) -> Result<(), PipelineError> {
         for limb in [Limb::LeftLeg, Limb::RightLeg] {
             let at = |level| points[point_index(limb, level)];
             let (thigh, shank) = (at(1) - at(0), at(2) - at(1));
-            if !(thigh.angle(&shank) > BENT_RAD) {
+            let bend = thigh.angle(&shank);
+            if bend.is_nan() || bend < BENT_RAD {
                 continue;
             }
             // The knee lies in front of the line from hip to foot, whatever the leg does.

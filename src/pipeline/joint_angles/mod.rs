@@ -10,6 +10,8 @@ pub mod observation;
 pub mod paper;
 pub mod particle_model;
 pub mod posterior;
+pub mod sensor_noise;
+pub mod smoother;
 
 use super::PipelineError;
 use crate::assessment::{Assessment, JointAngleSettings, Method, Provenance, Quality, Series, Settings, Warning};
@@ -52,7 +54,8 @@ pub fn assess(
                 paper::run(&observations, &calibration, noise, settings.particles, settings.seed, monitor, emit)?;
             quality.effective_sample_size = Some(sizes);
         }
-        Method::Ik | Method::Nite | Method::Smoother => {
+        Method::Smoother => smoother::run(&observations, &calibration, monitor, emit)?,
+        Method::Ik | Method::Nite => {
             run_closed_geometry(&observations, &calibration, monitor, emit)?;
             quality.warnings.push(Warning::new(
                 "no_interval",

@@ -59,8 +59,7 @@ impl NoiseModel {
         let hip = POSITION_SD_MM[1][0];
         let mut observation = ObservationCovariance::zeros();
         for limb in Limb::ALL {
-            for level in 0..3 {
-                let sd = POSITION_SD_MM[usize::from(!limb.is_arm())][level];
+            for (level, sd) in POSITION_SD_MM[usize::from(!limb.is_arm())].iter().enumerate() {
                 for axis in 0..3 {
                     let row = 3 * point_index(limb, level) + axis;
                     for other in (axis..OBSERVATION_DIMENSION).step_by(3) {
