@@ -58,10 +58,13 @@ pub struct JointAngleSettings {
     pub particles: u32,
     /// Seed of the random streams.
     pub seed: u64,
+    /// Joints in which the sensor's confidence is lower count as not seen, 0 to 1.
+    #[schema(minimum = 0, maximum = 1)]
+    pub min_confidence: f32,
 }
 
 impl Default for JointAngleSettings {
     fn default() -> Self {
-        Self { method: Method::Smoother, particles: 512, seed: 1 }
+        Self { method: Method::Smoother, particles: 512, seed: 1, min_confidence: 0.3 }
     }
 }

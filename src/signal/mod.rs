@@ -1,1 +1,3 @@
-//! Time series: interpolation, alignment of clocks, stillness.
+//! Time series: stillness. Functions of numbers over time that know no body and no sensor.
+
+pub mod stillness;

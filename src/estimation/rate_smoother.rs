@@ -1,0 +1,339 @@
+//! Gaussian smoothing of a posture whose rates change at random: an iterated extended Kalman filter and the backward
+//! pass of Bryson and Frazier, on any space where small steps form a vector of length `D`.
+//!
+//! ```text
+//! x' = x ⊞ a v            a = τ (1 − e^{−Δt/τ})
+//! v' = b v + w            b = e^{−Δt/τ},  w from white acceleration of spectral density q
+//! ```
+//!
+//! The rate decays with time constant τ, so that a posture that is not seen comes to rest instead of flying off, and
+//! the interval grows to a bound. The model supplies, at a posture `x`, the information `H = JᵀR⁻¹J` and gradient
+//! `g = JᵀR⁻¹(y − h(x))` of the observation; the driver knows no body.
+//!
+//! The backward pass needs no inverse of the predicted covariance, which becomes singular when a direction is known
+//! exactly. All matrices are kept as `D × D` blocks of posture (p) and rate (r).
+
+use nalgebra::{SMatrix, SVector};
+
+/// A space of postures, and what an observation says at one of them.
+pub trait RateModel<const D: usize> {
+    /// A posture.
+    type Posture: Clone;
+
+    /// The posture after a small step.
+    fn moved(&self, posture: &Self::Posture, step: &SVector<f64, D>) -> Self::Posture;
+
+    /// The step that leads from `from` to `to`.
+    fn step_between(&self, from: &Self::Posture, to: &Self::Posture) -> SVector<f64, D>;
+
+    /// Information and gradient of frame `t`'s observation at a posture.
+    fn information(&self, t: usize, posture: &Self::Posture) -> (SMatrix<f64, D, D>, SVector<f64, D>);
+
+    /// Spectral density of the acceleration in each direction during the interval that ends at frame `t`, rad²/s³.
+    fn acceleration_density(&self, t: usize) -> SVector<f64, D>;
+}
+
+/// How the smoother runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateSettings {
+    /// Time constant with which a rate decays, seconds.
+    pub rate_decay_s: f64,
+    /// Standard deviation of the first posture around its guess, in the unit of a step.
+    pub initial_sd: f64,
+    /// Standard deviation of the first rates, step units per second.
+    pub initial_rate_sd: f64,
+    /// Gauss–Newton iterations of each frame.
+    pub iterations: usize,
+}
+
+type Block<const D: usize> = SMatrix<f64, D, D>;
+
+/// Posture, rate and their covariance.
+#[derive(Debug, Clone)]
+struct Belief<P, const D: usize> {
+    posture: P,
+    rate: SVector<f64, D>,
+    pp: Block<D>,
+    pr: Block<D>,
+    rr: Block<D>,
+}
+
+/// What the backward pass needs of one frame.
+#[derive(Debug, Clone)]
+struct Stored<P, const D: usize> {
+    updated: Belief<P, D>,
+    /// `P_pp` before the update and `H` at the final posture give the gain again; keeping its two products is cheaper.
+    retained: Block<D>,
+    rate_gain: Block<D>,
+    weight: Block<D>,
+    weighted_innovation: SVector<f64, D>,
+    /// Coefficients (a, b) of the step that led to this frame.
+    step: (f64, f64),
+}
+
+/// Estimate of one frame.
+#[derive(Debug, Clone)]
+pub struct Smoothed<P, const D: usize> {
+    /// Posture.
+    pub posture: P,
+    /// Rate, step units per second.
+    pub rate: SVector<f64, D>,
+    /// Covariance of the posture's error.
+    pub covariance: SMatrix<f64, D, D>,
+}
+
+/// Filters forwards, frame by frame.
+#[derive(Debug)]
+pub struct RateFilter<P, const D: usize> {
+    settings: RateSettings,
+    belief: Belief<P, D>,
+    stored: Vec<Stored<P, D>>,
+}
+
+impl<P: Clone, const D: usize> RateFilter<P, D> {
+    /// A filter that starts around a posture at rest.
+    pub fn new(initial: P, settings: RateSettings) -> Self {
+        let variance = |sd: f64| Block::identity() * sd.powi(2);
+        let belief = Belief {
+            posture: initial,
+            rate: SVector::zeros(),
+            pp: variance(settings.initial_sd),
+            pr: Block::zeros(),
+            rr: variance(settings.initial_rate_sd),
+        };
+        Self { settings, belief, stored: Vec::new() }
+    }
+
+    /// The next frame, `interval_s` seconds after the last. Returns the forward estimate.
+    pub fn step<M: RateModel<D, Posture = P>>(&mut self, model: &M, t: usize, interval_s: f64) -> Smoothed<P, D> {
+        let step = self.predict(model, t, interval_s);
+        let stored = self.update(model, t, step);
+        self.stored.push(stored);
+        Smoothed { posture: self.belief.posture.clone(), rate: self.belief.rate, covariance: self.belief.pp }
+    }
+
+    fn predict<M: RateModel<D, Posture = P>>(&mut self, model: &M, t: usize, interval_s: f64) -> (f64, f64) {
+        if interval_s <= 0.0 {
+            return (0.0, 1.0);
+        }
+        let decay = self.settings.rate_decay_s;
+        let s = interval_s / decay;
+        let (a, b) = (-decay * (-s).exp_m1(), (-s).exp());
+        let belief = &mut self.belief;
+        belief.posture = model.moved(&belief.posture, &(belief.rate * a));
+        belief.rate *= b;
+        belief.pp += (belief.pr + belief.pr.transpose()) * a + belief.rr * (a * a);
+        belief.pr = (belief.pr + belief.rr * a) * b;
+        belief.rr *= b * b;
+        // Integrals of white acceleration through the decaying rate.
+        let to_posture = 0.5 * decay.powi(3) * (2.0 * s - 3.0 + 4.0 * (-s).exp() - (-2.0 * s).exp());
+        let to_both = 0.5 * decay.powi(2) * (-s).exp_m1().powi(2);
+        let to_rate = -0.5 * decay * (-2.0 * s).exp_m1();
+        let density = model.acceleration_density(t);
+        for d in 0..D {
+            belief.pp[(d, d)] += density[d] * to_posture;
+            belief.pr[(d, d)] += density[d] * to_both;
+            belief.rr[(d, d)] += density[d] * to_rate;
+        }
+        (a, b)
+    }
+
+    /// Gauss–Newton on the posterior: `δ = P (I + H P)⁻¹ (g + H e)` with `e` from the prediction to the iterate.
+    fn update<M: RateModel<D, Posture = P>>(&mut self, model: &M, t: usize, step: (f64, f64)) -> Stored<P, D> {
+        let belief = &mut self.belief;
+        let predicted = belief.posture.clone();
+        let mut posture = predicted.clone();
+        let mut weight = Block::zeros();
+        let mut retained = Block::identity();
+        let mut innovation = SVector::zeros();
+        for _ in 0..self.settings.iterations {
+            let (information, gradient) = model.information(t, &posture);
+            let from_prediction = model.step_between(&predicted, &posture);
+            let system = Block::identity() + information * belief.pp;
+            // I + H P has only eigenvalues ≥ 1, since H and P are positive semi-definite: the solution exists.
+            let Some(inverse) = system.try_inverse() else { break };
+            innovation = inverse * (gradient + information * from_prediction);
+            weight = inverse * information;
+            retained = inverse.transpose();
+            let correction = belief.pp * innovation;
+            posture = model.moved(&predicted, &correction);
+        }
+        symmetrize(&mut weight);
+        let rate_gain = belief.pr.transpose() * weight;
+        belief.rate += belief.pr.transpose() * innovation;
+        belief.posture = posture;
+        belief.rr -= rate_gain * belief.pr;
+        let to_posture = belief.pp * weight;
+        belief.pr -= to_posture * belief.pr;
+        belief.pp -= to_posture * belief.pp;
+        symmetrize(&mut belief.pp);
+        symmetrize(&mut belief.rr);
+        Stored { updated: belief.clone(), retained, rate_gain, weight, weighted_innovation: innovation, step }
+    }
+
+    /// The backward pass: estimates of all frames given all observations, last frame first.
+    pub fn smooth<M: RateModel<D, Posture = P>>(self, model: &M, mut emit: impl FnMut(Smoothed<P, D>)) {
+        let (mut lp, mut lr) = (SVector::<f64, D>::zeros(), SVector::<f64, D>::zeros());
+        let (mut pp, mut pr, mut rr) = (Block::<D>::zeros(), Block::<D>::zeros(), Block::<D>::zeros());
+        for frame in self.stored.into_iter().rev() {
+            let u = &frame.updated;
+            let from_left = (u.pp * pp + u.pr * pr.transpose(), u.pp * pr + u.pr * rr);
+            let reduction = from_left.0 * u.pp + from_left.1 * u.pr.transpose();
+            let correction = -(u.pp * lp + u.pr * lr);
+            let mut covariance = u.pp - reduction;
+            symmetrize(&mut covariance);
+            emit(Smoothed {
+                posture: model.moved(&u.posture, &correction),
+                rate: u.rate - (u.pr.transpose() * lp + u.rr * lr),
+                covariance,
+            });
+            // Through the update: C = I − K H, with C_pp = retained and C_rp = −rate_gain.
+            let (c, k) = (&frame.retained, &frame.rate_gain);
+            let cp = c.transpose() * pp - k.transpose() * pr.transpose();
+            let cr = c.transpose() * pr - k.transpose() * rr;
+            pp = cp * c - cr * k + frame.weight;
+            pr = cr;
+            lp = c.transpose() * lp - k.transpose() * lr - frame.weighted_innovation;
+            // Through the prediction: F = [I aI; 0 bI].
+            let (a, b) = frame.step;
+            lr = lp * a + lr * b;
+            rr = pp * (a * a) + (pr + pr.transpose()) * (a * b) + rr * (b * b);
+            pr = pp * a + pr * b;
+            symmetrize(&mut pp);
+            symmetrize(&mut rr);
+        }
+    }
+}
+
+fn symmetrize<const D: usize>(matrix: &mut Block<D>) {
+    for column in 0..D {
+        for row in 0..column {
+            let mean = 0.5 * (matrix[(row, column)] + matrix[(column, row)]);
+            matrix[(row, column)] = mean;
+            matrix[(column, row)] = mean;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Two independent coordinates, the first seen, the second seen together with the first.
+    struct Line {
+        seen: Vec<Option<(f64, f64)>>,
+        density: f64,
+        noise: f64,
+    }
+
+    impl RateModel<2> for Line {
+        type Posture = SVector<f64, 2>;
+
+        fn moved(&self, posture: &Self::Posture, step: &SVector<f64, 2>) -> Self::Posture {
+            posture + step
+        }
+
+        fn step_between(&self, from: &Self::Posture, to: &Self::Posture) -> SVector<f64, 2> {
+            to - from
+        }
+
+        fn information(&self, t: usize, posture: &Self::Posture) -> (SMatrix<f64, 2, 2>, SVector<f64, 2>) {
+            let Some((first, sum)) = self.seen[t] else { return (SMatrix::zeros(), SVector::zeros()) };
+            let j = SMatrix::<f64, 2, 2>::new(1.0, 0.0, 1.0, 1.0);
+            let residual = SVector::<f64, 2>::new(first, sum) - j * posture;
+            (j.transpose() * j / self.noise, j.transpose() * residual / self.noise)
+        }
+
+        fn acceleration_density(&self, _t: usize) -> SVector<f64, 2> {
+            SVector::repeat(self.density)
+        }
+    }
+
+    const SETTINGS: RateSettings =
+        RateSettings { rate_decay_s: 0.8, initial_sd: 2.0, initial_rate_sd: 1.5, iterations: 1 };
+
+    fn model() -> Line {
+        let value = |t: usize| (t as f64 * 0.4).sin();
+        let seen = (0..12).map(|t| (!(5..8).contains(&t)).then(|| (value(t), value(t) + 0.1 * t as f64))).collect();
+        Line { seen, density: 0.7, noise: 0.05 }
+    }
+
+    /// The same model solved as one least-squares problem over all frames: the exact posterior of a linear model.
+    fn batch(model: &Line, intervals: &[f64]) -> Vec<(SVector<f64, 2>, SMatrix<f64, 2, 2>)> {
+        let n = intervals.len();
+        let mut information = DMatrix::<f64>::zeros(4 * n, 4 * n);
+        let mut gradient = DVector::<f64>::zeros(4 * n);
+        for d in 0..2 {
+            information[(d, d)] += 1.0 / SETTINGS.initial_sd.powi(2);
+            information[(2 + d, 2 + d)] += 1.0 / SETTINGS.initial_rate_sd.powi(2);
+        }
+        for t in 0..n {
+            let (h, g) = model.information(t, &SVector::zeros());
+            for i in 0..2 {
+                gradient[4 * t + i] += g[i];
+                for j in 0..2 {
+                    information[(4 * t + i, 4 * t + j)] += h[(i, j)];
+                }
+            }
+            if t == 0 {
+                continue;
+            }
+            let (tau, s) = (SETTINGS.rate_decay_s, intervals[t] / SETTINGS.rate_decay_s);
+            let (a, b) = (tau * (1.0 - (-s).exp()), (-s).exp());
+            let qpp = 0.5 * tau.powi(3) * (2.0 * s - 3.0 + 4.0 * (-s).exp() - (-2.0 * s).exp());
+            let qpr = 0.5 * tau.powi(2) * (1.0 - (-s).exp()).powi(2);
+            let qrr = 0.5 * tau * (1.0 - (-2.0 * s).exp());
+            let q = SMatrix::<f64, 2, 2>::new(qpp, qpr, qpr, qrr) * model.density;
+            let q_inverse = q.try_inverse().expect("positive definite");
+            for d in 0..2 {
+                // Residual of (p, r): [x_t − x_{t−1} − a v_{t−1}, v_t − b v_{t−1}].
+                let rows = [4 * (t - 1) + d, 4 * (t - 1) + 2 + d, 4 * t + d, 4 * t + 2 + d];
+                let j = SMatrix::<f64, 2, 4>::new(-1.0, -a, 1.0, 0.0, 0.0, -b, 0.0, 1.0);
+                let block = j.transpose() * q_inverse * j;
+                for (i, row) in rows.iter().enumerate() {
+                    for (k, column) in rows.iter().enumerate() {
+                        information[(*row, *column)] += block[(i, k)];
+                    }
+                }
+            }
+        }
+        let covariance = information.try_inverse().expect("observable");
+        let mean = &covariance * gradient;
+        let frame = |t: usize| {
+            let m = SVector::<f64, 2>::new(mean[4 * t], mean[4 * t + 1]);
+            (m, covariance.fixed_view::<2, 2>(4 * t, 4 * t).into_owned())
+        };
+        (0..n).map(frame).collect()
+    }
+
+    #[test]
+    fn the_smoother_is_the_least_squares_solution_over_all_frames_also_through_a_gap() {
+        let model = model();
+        let intervals: Vec<f64> = (0..12).map(|t| if t == 0 { 0.0 } else { 0.03 + 0.01 * (t % 3) as f64 }).collect();
+        let mut filter = RateFilter::new(SVector::zeros(), SETTINGS);
+        for (t, interval) in intervals.iter().enumerate() {
+            filter.step(&model, t, *interval);
+        }
+        let mut smoothed = Vec::new();
+        filter.smooth(&model, |frame| smoothed.push(frame));
+        smoothed.reverse();
+        for (t, (mean, covariance)) in batch(&model, &intervals).into_iter().enumerate() {
+            assert!((smoothed[t].posture - mean).norm() < 1e-9, "frame {t}");
+            assert!((smoothed[t].covariance - covariance).norm() < 1e-9, "covariance of frame {t}");
+        }
+    }
+
+    #[test]
+    fn an_unseen_posture_comes_to_rest_and_its_uncertainty_stays_bounded_in_rate() {
+        let model = Line { seen: vec![Some((0.0, 0.0)), Some((0.1, 0.1)), None], density: 0.5, noise: 1e-6 };
+        let mut filter = RateFilter::new(SVector::zeros(), SETTINGS);
+        filter.step(&model, 0, 0.0);
+        filter.step(&model, 1, 0.1);
+        let after = filter.step(&model, 2, 100.0);
+        assert!(after.rate.norm() < 1e-12);
+        // One metre per second decaying over 0.8 s goes on by at most 0.8.
+        assert!(after.posture[0] < 0.1 + 1.2 * SETTINGS.rate_decay_s);
+        assert!(filter.belief.rr[(0, 0)] < 0.5 * 0.5 * SETTINGS.rate_decay_s + 1e-9);
+    }
+}

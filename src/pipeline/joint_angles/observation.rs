@@ -1,0 +1,122 @@
+//! From skeleton frames to the observations of the model: twelve points relative to the torso joint.
+
+use crate::assessment::JointAngleSettings;
+use crate::body::skeleton::point_index;
+use crate::body::{Joint, Limb, POINT_COUNT};
+use crate::pipeline::PipelineError;
+use crate::recording::SkeletonRecording;
+use nalgebra::{Rotation3, Vector3};
+
+/// The observed points of every frame, relative to the torso joint, metres; NaN where a point was not seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observations {
+    /// Time of each frame, nanoseconds.
+    pub time_ns: Vec<i64>,
+    /// Points in the order of [`point_index`], in the frame that `subject_from_world` leads to.
+    pub points: Vec<[Vector3<f64>; POINT_COUNT]>,
+    /// Turn about the vertical that has been applied to the points.
+    pub subject_from_world: Rotation3<f64>,
+}
+
+/// Bit mask of the points seen in a frame.
+pub type SeenMask = u16;
+
+/// Every point seen.
+pub const ALL_SEEN: SeenMask = (1 << POINT_COUNT) - 1;
+
+impl Observations {
+    /// Reads the model's points from a recording, still in `world`.
+    ///
+    /// A point counts as seen when the sensor's confidence in it and in the torso joint reaches
+    /// `settings.min_confidence`. Without a torso joint in the recording the middle of shoulders and hips stands in.
+    ///
+    /// # Errors
+    /// `joints_missing` when the recording lacks a joint that the model needs.
+    pub fn from_recording(skeleton: &SkeletonRecording, settings: &JointAngleSettings) -> Result<Self, PipelineError> {
+        let columns = point_columns(skeleton)?;
+        let torso_columns = match skeleton.column(Joint::Torso) {
+            Some(column) => vec![column],
+            None => Limb::ALL.iter().map(|limb| columns[point_index(*limb, 0)]).collect(),
+        };
+        let mut points = Vec::with_capacity(skeleton.len());
+        for t in 0..skeleton.len() {
+            let (frame, confidence) = (skeleton.frame(t), skeleton.frame_confidence(t));
+            let seen = |column: usize| {
+                let trusted = confidence[column] >= settings.min_confidence && confidence[column] > 0.0;
+                if trusted { frame[column] } else { Vector3::repeat(f64::NAN) }
+            };
+            let torso = torso_columns.iter().map(|c| seen(*c)).sum::<Vector3<f64>>() / torso_columns.len() as f64;
+            points.push(columns.map(|column| seen(column) - torso));
+        }
+        Ok(Self { time_ns: skeleton.time_ns.clone(), points, subject_from_world: Rotation3::identity() })
+    }
+
+    /// Turns the points about the vertical.
+    pub fn rotate(&mut self, subject_from_world: Rotation3<f64>) {
+        for frame in &mut self.points {
+            for point in frame {
+                *point = subject_from_world * *point;
+            }
+        }
+        self.subject_from_world = subject_from_world * self.subject_from_world;
+    }
+
+    /// Number of frames.
+    pub fn len(&self) -> usize {
+        self.time_ns.len()
+    }
+
+    /// True without any frame.
+    pub fn is_empty(&self) -> bool {
+        self.time_ns.is_empty()
+    }
+
+    /// Time from the previous frame to frame `t`, seconds; 0 for the first.
+    pub fn interval_s(&self, t: usize) -> f64 {
+        if t == 0 { 0.0 } else { (self.time_ns[t] - self.time_ns[t - 1]) as f64 * 1e-9 }
+    }
+
+    /// Points seen in frame `t`.
+    pub fn seen(&self, t: usize) -> SeenMask {
+        seen_mask(&self.points[t])
+    }
+}
+
+/// Bit mask of the points that are present.
+pub fn seen_mask(points: &[Vector3<f64>; POINT_COUNT]) -> SeenMask {
+    let bits = points.iter().enumerate().filter(|(_, point)| point.x.is_finite());
+    bits.fold(0, |mask, (p, _)| mask | 1 << p)
+}
+
+/// True when the mask holds all three points of a limb.
+pub fn sees_limb(mask: SeenMask, limb: Limb) -> bool {
+    mask >> point_index(limb, 0) & 0b111 == 0b111
+}
+
+/// True when the mask holds at least three of the four limb roots, which fix the trunk.
+pub fn sees_trunk(mask: SeenMask) -> bool {
+    Limb::ALL.iter().filter(|limb| mask >> point_index(**limb, 0) & 1 == 1).count() >= 3
+}
+
+/// Columns of the twelve points in a recording.
+fn point_columns(skeleton: &SkeletonRecording) -> Result<[usize; POINT_COUNT], PipelineError> {
+    let mut columns = [0; POINT_COUNT];
+    let mut missing = Vec::new();
+    for limb in Limb::ALL {
+        for (level, (joint, stand_in)) in limb.joints().into_iter().enumerate() {
+            match skeleton.column(joint).or_else(|| skeleton.column(stand_in)) {
+                Some(column) => columns[point_index(limb, level)] = column,
+                None => missing.push(joint.name()),
+            }
+        }
+    }
+    if missing.is_empty() {
+        return Ok(columns);
+    }
+    let sentence = format!(
+        "joint angles need the joints {}, which this recording does not have; record them, or name them as in the \
+         recording format",
+        missing.join(", ")
+    );
+    Err(PipelineError::Unsuitable { code: "joints_missing", place: Some("joints".into()), sentence })
+}
