@@ -18,7 +18,9 @@ pub(super) fn defect_in_json(text: &[u8], error: &serde_json::Error, root: &str)
             "truncated",
             format!("the JSON text ends in the middle ({words}); send the whole recording again"),
         ),
-        Category::Syntax | Category::Io | Category::Eof if is_not_finite(text, offset) || words.contains("number out of range") => {
+        Category::Syntax | Category::Io | Category::Eof
+            if is_not_finite(text, offset) || words.contains("number out of range") =>
+        {
             DecodeError::new(
                 "not_finite",
                 "found a number that is not finite (NaN, Infinity or beyond a 64-bit float); every number must be \
