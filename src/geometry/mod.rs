@@ -6,3 +6,4 @@
 pub mod attitude;
 pub mod euler;
 pub mod lanes;
+pub mod three_point;

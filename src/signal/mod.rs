@@ -1,3 +1,7 @@
-//! Time series: stillness. Functions of numbers over time that know no body and no sensor.
+//! Time series: interpolation, alignment of clocks, stillness.
+//!
+//! Time stamps are nanoseconds and strictly increasing; a missing value is NaN. Nothing here knows a body or a sensor.
 
+pub mod alignment;
+pub mod interpolation;
 pub mod stillness;
