@@ -94,7 +94,10 @@ impl Queue {
     pub async fn release(&self, id: JobId, attempt: u32) -> Result<(), StorageError> {
         let mut transaction = self.store.begin().await?;
         let released = sqlx::query(
-            "UPDATE jobs SET state = 'queued', max_attempts = max_attempts + 1, due_at = ?3, worker = NULL, started_at = NULL,
+            "UPDATE jobs SET state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'queued' END,
+                             due_at = CASE WHEN cancel_requested THEN NULL ELSE ?3 END,
+                             finished_at = CASE WHEN cancel_requested THEN ?3 END,
+                             max_attempts = max_attempts + 1, worker = NULL, started_at = NULL,
                              progress_step = 'waiting', progress_done = 0, progress_total = 0
              WHERE id = ?1 AND attempt = ?2 AND state = 'running'",
         )

@@ -14,7 +14,7 @@ use std::io::{self, Read};
 pub enum AttemptError {
     /// Somebody asked to stop.
     Cancelled,
-    /// It lies in the recording: another attempt would end in the same way.
+    /// Another attempt would end in the same way; mostly it lies in the recording.
     Refused(JobError),
     /// It lies with the server: another attempt may succeed.
     Failed(JobError),
@@ -60,11 +60,17 @@ impl From<PipelineError> for AttemptError {
 impl From<StorageError> for AttemptError {
     fn from(error: StorageError) -> Self {
         tracing::error!(%error, "the storage failed during an attempt");
-        let (code, sentence) = match error {
-            StorageError::Corrupt(_) => ("result_not_storable", "the result contradicts itself and was not stored"),
-            _ => ("storage_failed", "the server could not read the recording or store the result"),
-        };
-        Self::Failed(JobError::new(code, sentence))
+        match error {
+            StorageError::Corrupt(_) => Self::Refused(JobError::new(
+                "result_not_storable",
+                "the stored recording is damaged or its result contradicts itself; the operator finds the details in \
+                 the log",
+            )),
+            _ => Self::Failed(JobError::new(
+                "storage_failed",
+                "the server could not read the recording or store the result; the operator finds the details in the log",
+            )),
+        }
     }
 }
 
