@@ -74,13 +74,7 @@ async fn a_recording_and_its_job_are_stored_together_or_not_at_all() {
         .execute(&rows)
         .await
         .unwrap();
-    let mut writer = bench.queue.store().blobs().writer().await.unwrap();
-    writer.write("abc".into()).await.unwrap();
-    let new = surefoot::storage::NewRecording {
-        session_id: bench.session,
-        blob: writer.seal().await.unwrap().keep().await.unwrap(),
-        inspection: crate::support::inspection(),
-    };
+    let new = bench.new_recording(b"abc").await;
     let failed = bench.queue.submit(&bench.access, &new, &Default::default()).await;
     assert!(matches!(failed, Err(StorageError::Database(_))), "{failed:?}");
     let recordings: i64 = sqlx::query_scalar("SELECT count(*) FROM recordings").fetch_one(&rows).await.unwrap();
