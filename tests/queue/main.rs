@@ -1,0 +1,6 @@
+//! The queue, driven by hand: nobody sleeps, time is turned, faults are injected.
+
+mod access;
+mod claiming;
+mod support;
+mod working;
