@@ -1,6 +1,7 @@
 //! A reference at the times of an assessment.
 
 use crate::recording::ReferenceSeries;
+use crate::signal::interpolation::interpolate;
 
 /// Longest time between two samples of a reference that is bridged, nanoseconds: the angles of quick exercises are not
 /// straight lines over longer times.
@@ -12,18 +13,11 @@ pub fn interpolated(reference: &ReferenceSeries, time_ns: &[i64]) -> Vec<f64> {
     let value_at = |time: i64| {
         let on_reference_clock = time.saturating_sub(reference.clock_offset_ns);
         let next = reference.time_ns.partition_point(|t| *t < on_reference_clock);
-        let (Some(after), Some(high)) = (reference.time_ns.get(next), reference.values.get(next)) else {
-            return f64::NAN;
-        };
-        if *after == on_reference_clock {
-            return *high;
+        let (before, after) = (reference.time_ns.get(next.wrapping_sub(1)), reference.time_ns.get(next));
+        match (before, after) {
+            (Some(before), Some(after)) if *after != on_reference_clock && after - before > LONGEST_GAP_NS => f64::NAN,
+            _ => interpolate(&reference.time_ns, &reference.values, on_reference_clock),
         }
-        let Some(previous) = next.checked_sub(1) else { return f64::NAN };
-        let (before, low) = (reference.time_ns[previous], reference.values[previous]);
-        if after - before > LONGEST_GAP_NS {
-            return f64::NAN;
-        }
-        low + (high - low) * (on_reference_clock - before) as f64 / (after - before) as f64
     };
     time_ns.iter().map(|time| value_at(*time)).collect()
 }

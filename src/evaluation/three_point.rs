@@ -1,6 +1,7 @@
 //! The angle that any program can read off three joints: no model, no filter. What an estimate has to beat.
 
 use crate::body::{Limb, Side};
+use crate::geometry::three_point::flexion_of_three_points;
 use crate::recording::SkeletonRecording;
 
 /// Knee flexion of each frame, degrees: 180° less the angle at the knee between hip and ankle; NaN where one of the
@@ -13,9 +14,7 @@ pub fn knee_flexion_deg(skeleton: &SkeletonRecording, side: Side) -> Option<Vec<
     }
     let flexion = |t: usize| {
         let [hip, knee, ankle] = columns.map(|column| skeleton.frame(t)[column]);
-        // The angle between thigh and shank is 0 when the leg is straight; coinciding joints have none.
-        let (thigh, shank) = (knee - hip, ankle - knee);
-        if thigh.norm_squared() * shank.norm_squared() > 0.0 { thigh.angle(&shank).to_degrees() } else { f64::NAN }
+        flexion_of_three_points(&hip, &knee, &ankle).to_degrees()
     };
     Some((0..skeleton.len()).map(flexion).collect())
 }

@@ -1,4 +1,7 @@
 use super::*;
+use crate::assessment::Method;
+use crate::evaluation::agreement::Agreement;
+use crate::evaluation::{Row, Trial};
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 
 fn settings() -> JointAngleSettings {
@@ -9,7 +12,7 @@ fn trial(exercise: Exercise, sensor: Preset, seed: u64) -> TrialSource {
     TrialSource::new(format!("{exercise} {seed}"), move || {
         let settings = SimulationSettings { duration_s: 10.0, ..SimulationSettings::new(exercise, sensor, seed) };
         let recording = simulate(&settings).map_err(|error| error.to_string())?.recording;
-        Ok(Trial { dataset: "simulated".into(), exercise: exercise.name().into(), name: String::new(), recording })
+        Ok(Trial { dataset: "simulated".into(), exercise: exercise.name().into(), recording })
     })
 }
 
@@ -54,7 +57,7 @@ fn a_trial_that_cannot_be_loaded_or_assessed_is_reported_and_the_others_count() 
         let settings = SimulationSettings::new(Exercise::Step, Preset::Clean, 1);
         let mut recording = simulate(&settings).map_err(|error| error.to_string())?.recording;
         recording.skeleton = None;
-        Ok(Trial { dataset: "simulated".into(), exercise: "step".into(), name: String::new(), recording })
+        Ok(Trial { dataset: "simulated".into(), exercise: "step".into(), recording })
     });
     let sources = [broken, one_frame, trial(Exercise::Step, Preset::Clean, 2)];
     let evaluation = evaluate(&sources, &[Contender::Method(Method::Ik)], &settings(), || ());
@@ -101,12 +104,4 @@ fn full_turns_are_no_error() {
         // The series are f32: at 400° they resolve 3e-5°.
         assert!((rmse(a) - rmse(b)).abs() < 1e-3, "{} {:?}", a.measure, a.side);
     }
-}
-
-#[test]
-fn names_parse_back_and_unknown_ones_are_refused() {
-    for contender in Contender::all() {
-        assert_eq!(contender.name().parse(), Ok(contender));
-    }
-    assert!("ukf".parse::<Contender>().unwrap_err().to_string().contains("smoother"));
 }
