@@ -147,13 +147,12 @@ fn imported(directory: &Path) -> anyhow::Result<Vec<TrialSource>> {
             Err(error) => return Err(error.into()),
         };
         for source in found {
+            // Exercises done wrongly on purpose are kept apart from the same done well.
+            let manner = if source.name.ends_with("_inc") { "_incorrect" } else { "" };
+            let exercise = format!("{}{manner}", source.exercise);
             sources.push(TrialSource::new(format!("{} {}", dataset.name(), source.name), move || {
                 let trial = source.read().map_err(|error| error.to_string())?;
-                Ok(Trial {
-                    dataset: dataset.name().to_owned(),
-                    exercise: source.exercise.clone(),
-                    recording: trial.recording,
-                })
+                Ok(Trial { dataset: dataset.name().to_owned(), exercise: exercise.clone(), recording: trial.recording })
             }));
         }
     }

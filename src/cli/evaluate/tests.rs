@@ -78,6 +78,7 @@ fn real_trials_are_compared_with_their_reference_where_the_data_are() {
     let squat = squat.expect("a row of the squat");
     assert_eq!(squat["n_trials"], 5);
     let rmse = squat["rmse_deg"].as_f64().unwrap();
-    // Measured beside Vicon with one lag per trial: 7.1°, with another way to choose the lag a degree more or less.
-    assert!((5.5..9.0).contains(&rmse), "{rmse}");
+    // The sides differ: medians of 6.6° on the right and 8.9° on the left; pooled within each trial it is 9.0°. The
+    // estimated lag of the clocks moves it by a few tenths.
+    assert!((8.0..10.0).contains(&rmse), "{rmse}");
 }
