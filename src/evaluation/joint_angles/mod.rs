@@ -14,8 +14,11 @@ use crate::progress::Monitor;
 use crate::recording::Recording;
 use rayon::prelude::*;
 
+/// Name of an angle, and its channel on a side.
+pub(super) type Measure = (&'static str, fn(Side) -> AngleChannel);
+
 /// The angles that are compared, with the channel of each side.
-pub(super) const MEASURES: [(&str, fn(Side) -> AngleChannel); 4] = [
+pub(super) const MEASURES: [Measure; 4] = [
     ("hip_flexion", AngleChannel::HipFlexion),
     ("hip_abduction", AngleChannel::HipAbduction),
     ("hip_axial_rotation", AngleChannel::HipAxialRotation),
