@@ -73,7 +73,7 @@ fn every_uiprmd_trial_imports_with_plausible_legs_and_a_knee_that_follows_vicon(
                 Side::Right => [Joint::RightHip, Joint::RightKnee, Joint::RightAnkle],
             };
             let (thigh, shank) = (bone_length(skeleton, hip, knee), bone_length(skeleton, knee, ankle));
-            assert!((0.28..0.52).contains(&thigh) && (0.28..0.52).contains(&shank), "{name}: {thigh} m, {shank} m");
+            assert!((0.25..0.55).contains(&thigh) && (0.25..0.55).contains(&shank), "{name}: {thigh} m, {shank} m");
         }
         // Upright in world: head above pelvis above ankles, subject's left at +x as the data set says.
         let at = |joint| skeleton.frame(0)[skeleton.column(joint).expect("joint")];
@@ -90,19 +90,10 @@ fn every_uiprmd_trial_imports_with_plausible_legs_and_a_knee_that_follows_vicon(
                 if high - low > 40.0 {
                     correlations.push(correlation(&pairs));
                 }
-                println!("{name} {}: r {:.3}, range {:.0}", side.name(), correlation(&pairs), high - low);
             }
         }
     }
     let report = ImportReport::of("uiprmd", trials.iter().map(|trial| trial.notes.clone()).collect());
-    println!(
-        "{:?}\nmedian r {:.4}, n {}, median lag {:.3}, max {:.3}",
-        report.defects,
-        median(correlations.clone()),
-        correlations.len(),
-        median(lags.clone()),
-        lags.iter().fold(0.0f64, |a, b| a.max(*b))
-    );
     assert_eq!(report.n_trials_with_reference, 46, "s03 has no Vicon file for m03");
     assert!(median(correlations) > 0.98, "knees that bend more than 40°");
     assert!(median(lags.clone()) < 0.12 && lags.iter().all(|lag| *lag < 0.65), "as the data set's description says");
@@ -144,17 +135,26 @@ fn every_keraal_trial_imports_with_orientations_along_the_bone_that_arrives() {
         let n = skeleton.joints.len();
         // Head, feet, hand tips and thumbs have none.
         assert_eq!(trial.notes.defects.zero_quaternions, 7 * skeleton.len() as u64);
-        let (knee, ankle) =
-            (skeleton.column(Joint::LeftKnee).expect("knee"), skeleton.column(Joint::LeftAnkle).expect("ankle"));
-        let angles: Vec<f64> = (0..skeleton.len())
-            .filter_map(|t| {
-                let bone = skeleton.frame(t)[ankle] - skeleton.frame(t)[knee];
-                Some((skeleton.orientations[t * n + ankle]? * nalgebra::Vector3::y()).angle(&bone).to_degrees())
-            })
-            .collect();
-        println!("{}: y against the shank {:.2} deg", trial.notes.name, median(angles.clone()));
-        assert!(median(angles) < 10.0);
-        assert!(skeleton.frame(0)[skeleton.column(Joint::Head).expect("head")].y > skeleton.frame(0)[knee].y);
+        let bones = [
+            (Joint::Pelvis, Joint::Torso),
+            (Joint::LeftHip, Joint::LeftKnee),
+            (Joint::LeftKnee, Joint::LeftAnkle),
+            (Joint::RightKnee, Joint::RightAnkle),
+            (Joint::RightShoulder, Joint::RightElbow),
+            (Joint::LeftElbow, Joint::LeftWrist),
+        ];
+        for (from, to) in bones {
+            let (from, to) = (skeleton.column(from).expect("joint"), skeleton.column(to).expect("joint"));
+            for t in 0..skeleton.len() {
+                let Some(orientation) = skeleton.orientations[t * n + to] else { continue };
+                let bone = skeleton.frame(t)[to] - skeleton.frame(t)[from];
+                let angle = (orientation * nalgebra::Vector3::y()).angle(&bone).to_degrees();
+                // Six decimals of a quaternion and of metres on bones of 0.2 m.
+                assert!(angle < 0.1, "{} frame {t}, {}: {angle} deg", trial.notes.name, skeleton.joints[to]);
+            }
+        }
+        let y = |joint| skeleton.frame(0)[skeleton.column(joint).expect("joint")].y;
+        assert!(y(Joint::Head) > y(Joint::Pelvis) && y(Joint::Pelvis) > y(Joint::LeftAnkle));
     }
 }
 
@@ -174,15 +174,13 @@ fn every_utdmhad_trial_imports_at_its_own_rate_with_a_thigh_that_follows_its_sen
         );
         let raw = utdmhad::raw_thigh_tilt_change_deg(skeleton);
         let r = correlation(&beside(&skeleton.time_ns, &raw, &trial.recording.references[0]));
-        println!("{} r {r:.3} {:?} {:?}", trial.notes.name, trial.notes.clock_offset, trial.notes.defects);
-        correlations.push(r);
+        // Jogging and walking in place are too fast for the smoothed skeleton, and a lunge with the left foot hardly
+        // tilts the right thigh.
+        if ["a24", "a25", "a27"].contains(&&trial.notes.name[..3]) {
+            correlations.push(r);
+        }
     }
-    println!(
-        "median r {:.3}, min {:.3}",
-        median(correlations.clone()),
-        correlations.iter().fold(1.0f64, |a, b| a.min(*b))
-    );
-    assert!(median(correlations) > 0.9);
+    assert!(median(correlations) > 0.94, "sit to stand, stand to sit, squat");
 }
 
 #[test]
