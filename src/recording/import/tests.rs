@@ -338,3 +338,34 @@ proptest! {
         prop_assert!(list(Dataset::Uiprmd, folder.path()).expect("a trial")[0].read().is_ok());
     }
 }
+
+#[test]
+fn in_every_data_set_bent_knees_lie_forward_and_the_right_foot_to_the_right() {
+    let Some(data) = shared_data() else { return };
+    for dataset in Dataset::ALL {
+        let mut n_bent = 0;
+        for trial in all_trials(dataset, &data) {
+            let skeleton = skeleton(&trial);
+            let at = |t: usize, joint| skeleton.frame(t)[skeleton.column(joint).expect("joint")];
+            let right_at = |t| at(t, Joint::RightHip) - at(t, Joint::LeftHip);
+            let apart = (0..skeleton.len())
+                .map(|t| (at(t, Joint::RightAnkle) - at(t, Joint::LeftAnkle)).dot(&right_at(t)))
+                .filter(|dot| dot.is_finite());
+            assert!(median(apart.collect()) > 0.0, "{}: the right foot is on the left", trial.notes.name);
+            let raw = uiprmd::raw_knee_flexion_deg(skeleton, Side::Right);
+            let bent = (0..skeleton.len()).filter(|&t| raw[t] > 55.0);
+            let forward: Vec<f64> = bent
+                .map(|t| {
+                    let middle = (at(t, Joint::RightHip) + at(t, Joint::RightAnkle)) / 2.0;
+                    // Z to the subject's right, Y up: X = Y × Z points forward.
+                    nalgebra::Vector3::y().cross(&right_at(t)).dot(&(at(t, Joint::RightKnee) - middle))
+                })
+                .collect();
+            if forward.len() > 5 {
+                n_bent += 1;
+                assert!(median(forward) > 0.0, "{}: the right knee bends backwards", trial.notes.name);
+            }
+        }
+        assert!(n_bent > 0, "{}: no trial bends the right knee", dataset.name());
+    }
+}
