@@ -41,7 +41,8 @@ pub struct Lag {
     /// Root mean square difference that is left at the best grid point after the constant offset (and gain) of each
     /// pair, in the series' unit.
     pub rmse_without_offset: f64,
-    /// Part of the series' variance that the reference explains at the best grid point, at most 1.
+    /// Part of the series' variance that the reference explains at the best grid point when a gain is fitted (the
+    /// squared correlation), 0 to 1.
     pub explained: f64,
     /// True when the best lag is the largest that was tried: the truth may lie beyond.
     pub is_at_limit: bool,
@@ -52,7 +53,7 @@ pub fn estimate_lag(pairs: &[Pair<'_>], search: &Search) -> Option<Lag> {
     let n_steps = search.max_lag_ns / search.step_ns;
     let costs: Vec<Option<Cost>> =
         (-n_steps..=n_steps).map(|step| mean_cost(pairs, step * search.step_ns, search)).collect();
-    let (best, Cost { left: cost, variance }) = costs
+    let (best, Cost { left: cost, unexplained, variance }) = costs
         .iter()
         .enumerate()
         .filter_map(|(i, cost)| cost.map(|cost| (i, cost)))
@@ -66,7 +67,7 @@ pub fn estimate_lag(pairs: &[Pair<'_>], search: &Search) -> Option<Lag> {
     Some(Lag {
         lag_ns: (best as i64 - n_steps) * search.step_ns + (fraction * search.step_ns as f64).round() as i64,
         rmse_without_offset: cost.sqrt(),
-        explained: if variance > 0.0 { 1.0 - cost / variance } else { 0.0 },
+        explained: if variance > 0.0 { 1.0 - unexplained / variance } else { 0.0 },
         is_at_limit: before.is_none() || after.is_none(),
     })
 }
@@ -78,16 +79,18 @@ fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
-/// Mean over the pairs of what one lag leaves unexplained, and of the series' own variance.
+/// Means over the pairs at one lag: of what is minimised, of the variance that no gain explains, and of the series' own
+/// variance.
 #[derive(Debug, Clone, Copy)]
 struct Cost {
     left: f64,
+    unexplained: f64,
     variance: f64,
 }
 
 /// The cost of one lag; nothing when a pair overlaps too little.
 fn mean_cost(pairs: &[Pair<'_>], lag_ns: i64, search: &Search) -> Option<Cost> {
-    let mut total = Cost { left: 0.0, variance: 0.0 };
+    let mut total = Cost { left: 0.0, unexplained: 0.0, variance: 0.0 };
     let mut both = Vec::new();
     for pair in pairs {
         both.clear();
@@ -109,16 +112,18 @@ fn mean_cost(pairs: &[Pair<'_>], lag_ns: i64, search: &Search) -> Option<Cost> {
             vr += v * r / n;
             rr += r * r / n;
         }
-        let left = match search.fits_gain {
-            true if rr > 0.0 => vv - vr * vr / rr,
-            true => vv,
-            false => vv - 2.0 * vr + rr,
-        };
-        total.left += left.max(0.0);
+        let unexplained = if rr > 0.0 { (vv - vr * vr / rr).max(0.0) } else { vv };
+        let without_gain = (vv - 2.0 * vr + rr).max(0.0);
+        total.left += if search.fits_gain { unexplained } else { without_gain };
+        total.unexplained += unexplained;
         total.variance += vv;
     }
     let n = pairs.len() as f64;
-    (!pairs.is_empty()).then(|| Cost { left: total.left / n, variance: total.variance / n })
+    (!pairs.is_empty()).then(|| Cost {
+        left: total.left / n,
+        unexplained: total.unexplained / n,
+        variance: total.variance / n,
+    })
 }
 
 #[cfg(test)]
