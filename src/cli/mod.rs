@@ -1,3 +1,4 @@
 //! The commands of the binary: one file per command.
 
+pub mod import;
 pub mod simulate;

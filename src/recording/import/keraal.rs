@@ -1,6 +1,8 @@
-//! KERAAL: Kinect v2 with positions and quaternions, x y z qx qy qz qw for each of 25 joints, 30 frames/s.
+//! KERAAL: Kinect v2 with positions and quaternions, x y z qw qx qy qz for each of 25 joints, 30 frames/s.
 //!
-//! Orientations are the Kinect SDK's: local y of a joint lies along the bone that *arrives* at it from its parent.
+//! Orientations are the Kinect SDK's: local y of a joint lies along the bone that *arrives* at it from its parent. That
+//! settles the order of the quaternion's numbers, which is described as qx qy qz qw: with the scalar first, y lies
+//! along the bone to 0.1° in every joint and frame; with the scalar last it points anywhere.
 //! Joints at the ends of limbs and the head have none (four zeros). The Vicon files hold rigid targets on the body, not
 //! joint centres, so there is no angle reference.
 
@@ -75,7 +77,7 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         for values in table.row(t).chunks_exact(VALUES_PER_JOINT) {
             skeleton.positions.push(Vector3::new(values[0], values[1], values[2]));
             skeleton.confidence.push(1.0);
-            let q = Quaternion::new(values[6], values[3], values[4], values[5]);
+            let q = Quaternion::new(values[3], values[4], values[5], values[6]);
             let orientation = UnitQuaternion::try_new(q, 0.5);
             n_zero += u64::from(orientation.is_none());
             skeleton.orientations.push(orientation);

@@ -73,7 +73,7 @@ fn every_uiprmd_trial_imports_with_plausible_legs_and_a_knee_that_follows_vicon(
                 Side::Right => [Joint::RightHip, Joint::RightKnee, Joint::RightAnkle],
             };
             let (thigh, shank) = (bone_length(skeleton, hip, knee), bone_length(skeleton, knee, ankle));
-            assert!((0.28..0.52).contains(&thigh) && (0.28..0.52).contains(&shank), "{name}: {thigh} m, {shank} m");
+            assert!((0.25..0.55).contains(&thigh) && (0.25..0.55).contains(&shank), "{name}: {thigh} m, {shank} m");
         }
         // Upright in world: head above pelvis above ankles, subject's left at +x as the data set says.
         let at = |joint| skeleton.frame(0)[skeleton.column(joint).expect("joint")];
@@ -90,19 +90,10 @@ fn every_uiprmd_trial_imports_with_plausible_legs_and_a_knee_that_follows_vicon(
                 if high - low > 40.0 {
                     correlations.push(correlation(&pairs));
                 }
-                println!("{name} {}: r {:.3}, range {:.0}", side.name(), correlation(&pairs), high - low);
             }
         }
     }
     let report = ImportReport::of("uiprmd", trials.iter().map(|trial| trial.notes.clone()).collect());
-    println!(
-        "{:?}\nmedian r {:.4}, n {}, median lag {:.3}, max {:.3}",
-        report.defects,
-        median(correlations.clone()),
-        correlations.len(),
-        median(lags.clone()),
-        lags.iter().fold(0.0f64, |a, b| a.max(*b))
-    );
     assert_eq!(report.n_trials_with_reference, 46, "s03 has no Vicon file for m03");
     assert!(median(correlations) > 0.98, "knees that bend more than 40°");
     assert!(median(lags.clone()) < 0.12 && lags.iter().all(|lag| *lag < 0.65), "as the data set's description says");
@@ -144,17 +135,26 @@ fn every_keraal_trial_imports_with_orientations_along_the_bone_that_arrives() {
         let n = skeleton.joints.len();
         // Head, feet, hand tips and thumbs have none.
         assert_eq!(trial.notes.defects.zero_quaternions, 7 * skeleton.len() as u64);
-        let (knee, ankle) =
-            (skeleton.column(Joint::LeftKnee).expect("knee"), skeleton.column(Joint::LeftAnkle).expect("ankle"));
-        let angles: Vec<f64> = (0..skeleton.len())
-            .filter_map(|t| {
-                let bone = skeleton.frame(t)[ankle] - skeleton.frame(t)[knee];
-                Some((skeleton.orientations[t * n + ankle]? * nalgebra::Vector3::y()).angle(&bone).to_degrees())
-            })
-            .collect();
-        println!("{}: y against the shank {:.2} deg", trial.notes.name, median(angles.clone()));
-        assert!(median(angles) < 10.0);
-        assert!(skeleton.frame(0)[skeleton.column(Joint::Head).expect("head")].y > skeleton.frame(0)[knee].y);
+        let bones = [
+            (Joint::Pelvis, Joint::Torso),
+            (Joint::LeftHip, Joint::LeftKnee),
+            (Joint::LeftKnee, Joint::LeftAnkle),
+            (Joint::RightKnee, Joint::RightAnkle),
+            (Joint::RightShoulder, Joint::RightElbow),
+            (Joint::LeftElbow, Joint::LeftWrist),
+        ];
+        for (from, to) in bones {
+            let (from, to) = (skeleton.column(from).expect("joint"), skeleton.column(to).expect("joint"));
+            for t in 0..skeleton.len() {
+                let Some(orientation) = skeleton.orientations[t * n + to] else { continue };
+                let bone = skeleton.frame(t)[to] - skeleton.frame(t)[from];
+                let angle = (orientation * nalgebra::Vector3::y()).angle(&bone).to_degrees();
+                // Six decimals of a quaternion and of metres on bones of 0.2 m.
+                assert!(angle < 0.1, "{} frame {t}, {}: {angle} deg", trial.notes.name, skeleton.joints[to]);
+            }
+        }
+        let y = |joint| skeleton.frame(0)[skeleton.column(joint).expect("joint")].y;
+        assert!(y(Joint::Head) > y(Joint::Pelvis) && y(Joint::Pelvis) > y(Joint::LeftAnkle));
     }
 }
 
@@ -174,15 +174,13 @@ fn every_utdmhad_trial_imports_at_its_own_rate_with_a_thigh_that_follows_its_sen
         );
         let raw = utdmhad::raw_thigh_tilt_change_deg(skeleton);
         let r = correlation(&beside(&skeleton.time_ns, &raw, &trial.recording.references[0]));
-        println!("{} r {r:.3} {:?} {:?}", trial.notes.name, trial.notes.clock_offset, trial.notes.defects);
-        correlations.push(r);
+        // Jogging and walking in place are too fast for the smoothed skeleton, and a lunge with the left foot hardly
+        // tilts the right thigh.
+        if ["a24", "a25", "a27"].contains(&&trial.notes.name[..3]) {
+            correlations.push(r);
+        }
     }
-    println!(
-        "median r {:.3}, min {:.3}",
-        median(correlations.clone()),
-        correlations.iter().fold(1.0f64, |a, b| a.min(*b))
-    );
-    assert!(median(correlations) > 0.9);
+    assert!(median(correlations) > 0.94, "sit to stand, stand to sit, squat");
 }
 
 #[test]
@@ -233,6 +231,22 @@ fn the_data_set_is_found_from_two_levels_above_and_not_elsewhere() {
 }
 
 #[test]
+fn a_gzip_file_that_is_cut_is_refused() {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(rows(50, 66).as_bytes()).expect("written");
+    let zipped = encoder.finish().expect("zipped");
+    assert_eq!(text_of_bytes(zipped.clone()).expect("sound"), rows(50, 66));
+    assert!(text_of_bytes(zipped[..zipped.len() - 9].to_vec()).is_err());
+}
+
+#[test]
+fn of_utdmhad_only_the_actions_with_the_sensor_on_the_thigh_are_listed() {
+    let folder = folder_with(&[("a01_s1_t1_skeleton.csv", b""), ("a22_s1_t1_skeleton.csv", b"")]);
+    let sources = list(Dataset::Utdmhad, folder.path()).expect("one");
+    assert_eq!(sources.iter().map(|source| source.name.as_str()).collect::<Vec<_>>(), ["a22_s1_t1"]);
+}
+
+#[test]
 fn a_malformed_row_is_an_error_that_names_the_file_and_the_row() {
     let file = Path::new("some/file.txt");
     let error = |text: &str| Table::parse(text, 0, 2, file).expect_err("malformed").to_string();
@@ -278,10 +292,10 @@ proptest! {
 
     #[test]
     fn any_bytes_in_any_file_are_refused_or_read_without_panic(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
-        let _ = text_of_bytes(&bytes);
+        let _ = text_of_bytes(bytes.clone());
         let mut zipped = vec![0x1f, 0x8b];
         zipped.extend(&bytes);
-        let _ = text_of_bytes(&zipped);
+        let _ = text_of_bytes(zipped);
         let folder = folder_with(&[
             ("segmented/kinect/positions/m01_s01_e01_positions.txt", &bytes),
             ("segmented/kinect/angles/m01_s01_e01_angles.txt", &bytes),
@@ -322,5 +336,36 @@ proptest! {
             ("segmented/kinect/angles/m01_s01_e01_angles.txt", text.as_bytes()),
         ]);
         prop_assert!(list(Dataset::Uiprmd, folder.path()).expect("a trial")[0].read().is_ok());
+    }
+}
+
+#[test]
+fn in_every_data_set_bent_knees_lie_forward_and_the_right_foot_to_the_right() {
+    let Some(data) = shared_data() else { return };
+    for dataset in Dataset::ALL {
+        let mut n_bent = 0;
+        for trial in all_trials(dataset, &data) {
+            let skeleton = skeleton(&trial);
+            let at = |t: usize, joint| skeleton.frame(t)[skeleton.column(joint).expect("joint")];
+            let right_at = |t| at(t, Joint::RightHip) - at(t, Joint::LeftHip);
+            let apart = (0..skeleton.len())
+                .map(|t| (at(t, Joint::RightAnkle) - at(t, Joint::LeftAnkle)).dot(&right_at(t)))
+                .filter(|dot| dot.is_finite());
+            assert!(median(apart.collect()) > 0.0, "{}: the right foot is on the left", trial.notes.name);
+            let raw = uiprmd::raw_knee_flexion_deg(skeleton, Side::Right);
+            let bent = (0..skeleton.len()).filter(|&t| raw[t] > 55.0);
+            let forward: Vec<f64> = bent
+                .map(|t| {
+                    let middle = (at(t, Joint::RightHip) + at(t, Joint::RightAnkle)) / 2.0;
+                    // Z to the subject's right, Y up: X = Y × Z points forward.
+                    nalgebra::Vector3::y().cross(&right_at(t)).dot(&(at(t, Joint::RightKnee) - middle))
+                })
+                .collect();
+            if forward.len() > 5 {
+                n_bent += 1;
+                assert!(median(forward) > 0.0, "{}: the right knee bends backwards", trial.notes.name);
+            }
+        }
+        assert!(n_bent > 0, "{}: no trial bends the right knee", dataset.name());
     }
 }

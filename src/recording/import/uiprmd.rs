@@ -60,7 +60,10 @@ const KNEE_COLUMN: [(Side, usize); 2] = [(Side::Left, 19 * 3), (Side::Right, 20 
 /// Reference excursion below which a knee says nothing of the lag, degrees.
 const MIN_EXCURSION_DEG: f64 = 10.0;
 
-const SEARCH: Search = Search { max_lag_ns: 700_000_000, step_ns: 10_000_000, min_overlap: 0.5 };
+/// Part of the variance of the raw knee angles that the reference must explain for the lag to be believed.
+const MIN_EXPLAINED: f64 = 0.5;
+
+const SEARCH: Search = Search { max_lag_ns: 700_000_000, step_ns: 10_000_000, min_overlap: 0.5, fits_gain: false };
 
 pub(super) fn list(root: &Path) -> Result<Vec<Source>, ImportError> {
     let mut sources = Vec::new();
@@ -237,7 +240,8 @@ fn align(skeleton: &SkeletonRecording, references: &mut [ReferenceSeries]) -> Op
         let (low, high) = reference.values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
         high - low
     };
-    let is_determined = !lag.is_at_limit && references.iter().any(|r| excursion(r) >= MIN_EXCURSION_DEG);
+    let moves = references.iter().any(|reference| excursion(reference) >= MIN_EXCURSION_DEG);
+    let is_determined = !lag.is_at_limit && lag.explained >= MIN_EXPLAINED && moves;
     // Without movement the minimum is noise: the streams are taken as starting together.
     let offset_ns = if is_determined { lag.lag_ns } else { 0 };
     for reference in references.iter_mut() {
