@@ -1,1 +1,3 @@
 //! The commands of the binary: one file per command.
+
+pub mod import;
