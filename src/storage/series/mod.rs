@@ -1,7 +1,7 @@
 //! Series of an assessment, in compressed chunks.
 //!
 //! A chunk holds [`CHUNK_SAMPLES`] samples of one channel: value, low, high and flags, each coded by itself (see
-//! [`codec`]). A read of a time range decodes only the chunks that it touches, and of those only the parts that were
+//! `codec`). A read of a time range decodes only the chunks that it touches, and of those only the parts that were
 //! asked for; one question to the database brings all channels.
 
 mod codec;
