@@ -1,0 +1,195 @@
+//! From comparisons of single trials to lines over data sets and exercises.
+
+use super::agreement::{Agreement, median};
+use super::contender::Contender;
+use super::error_analysis::{ErrorRow, error_row};
+use super::joint_angles::{Comparison, MEASURES, TrialOutcome};
+use crate::assessment::Method;
+use crate::body::Side;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// One line of the result: a method's agreement in one measure over the trials of an exercise. Errors are medians over
+/// the trials; both sides of a trial are pooled unless the measure names one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Where the trials come from.
+    pub dataset: String,
+    /// What was done in them.
+    pub exercise: String,
+    /// The method, or `raw`.
+    pub method: &'static str,
+    /// The angle, for example `knee_flexion` or `left_knee_flexion`.
+    pub measure: String,
+    /// Trials with at least one compared frame.
+    pub n_trials: usize,
+    /// Trials in which the method failed; see the failures.
+    pub n_failed: usize,
+    /// Compared samples of all trials; a frame counts once for each side.
+    pub n_frames: usize,
+    /// Share of the reference's samples for which the method has an observed (not bridged, not unobservable) value.
+    pub coverage: f64,
+    /// Mean absolute error, degrees.
+    pub mae_deg: Option<f64>,
+    /// Root mean square error, degrees.
+    pub rmse_deg: Option<f64>,
+    /// Root mean square error after the mean error of each trial and side is taken away, degrees.
+    pub rmse_without_offset_deg: Option<f64>,
+    /// Correlation, pooled within the sides.
+    pub correlation: Option<f64>,
+    /// Share of the samples whose 95 % interval holds the reference; absent for methods without intervals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval_coverage: Option<f64>,
+}
+
+/// A trial that could not be evaluated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failure {
+    /// The trial.
+    pub trial: String,
+    /// The method, or nothing when the trial could not even be loaded.
+    pub method: Option<&'static str>,
+    /// Why.
+    pub reason: String,
+}
+
+/// The whole result.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Evaluation {
+    /// Lines in the order of data set, exercise, contender, measure.
+    pub rows: Vec<Row>,
+    /// The paper's error analysis, in the order of data set, side, exercise (`all` last), method.
+    #[serde(skip)]
+    pub errors: Vec<ErrorRow>,
+    /// What could not be evaluated.
+    pub failures: Vec<Failure>,
+    /// Trials that were left out because they have no reference for any compared angle.
+    pub n_without_reference: usize,
+}
+
+/// Lines of all trials, and what went wrong.
+pub(super) fn summarize(outcomes: &[TrialOutcome], contenders: &[Contender]) -> Evaluation {
+    let mut evaluation = Evaluation::default();
+    let mut groups = Groups::new();
+    for outcome in outcomes {
+        match &outcome.place {
+            Ok(_) if outcome.results.is_empty() => evaluation.n_without_reference += 1,
+            Ok((dataset, exercise)) => groups.entry((dataset, exercise)).or_default().push(outcome),
+            Err(reason) => {
+                evaluation.failures.push(Failure { trial: outcome.name.clone(), method: None, reason: reason.clone() })
+            }
+        }
+        for (contender, result) in contenders.iter().zip(&outcome.results) {
+            if let Err(reason) = result {
+                evaluation.failures.push(Failure {
+                    trial: outcome.name.clone(),
+                    method: Some(contender.name()),
+                    reason: reason.clone(),
+                });
+            }
+        }
+    }
+    evaluation.errors = error_rows(&groups, contenders);
+    for ((dataset, exercise), trials) in groups {
+        for (i, contender) in contenders.iter().enumerate() {
+            let n_failed = trials.iter().filter(|trial| trial.results[i].is_err()).count();
+            let found: Vec<&[Comparison]> =
+                trials.iter().filter_map(|trial| Some(&trial.results[i].as_ref().ok()?.comparisons[..])).collect();
+            for (measure, _) in MEASURES {
+                for sides in [&Side::BOTH[..], &[Side::Left], &[Side::Right]] {
+                    let Some(mut row) = row_of(&found, measure, sides) else { continue };
+                    row.dataset = dataset.to_owned();
+                    row.exercise = exercise.to_owned();
+                    row.method = contender.name();
+                    row.n_failed = n_failed;
+                    evaluation.rows.push(row);
+                }
+            }
+        }
+    }
+    evaluation
+}
+
+/// Trials by data set and exercise.
+type Groups<'a> = BTreeMap<(&'a str, &'a str), Vec<&'a TrialOutcome>>;
+
+/// The paper's error analysis of every data set: each side, each exercise and all of them, each method.
+fn error_rows(groups: &Groups<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
+    let baseline = contenders.iter().position(|contender| *contender == Contender::Method(Method::Nite));
+    let mut sets: BTreeMap<&str, Vec<(&str, Vec<&TrialOutcome>)>> = BTreeMap::new();
+    for ((dataset, exercise), trials) in groups {
+        sets.entry(dataset).or_default().push((exercise, trials.clone()));
+    }
+    let mut rows = Vec::new();
+    for (dataset, mut exercises) in sets {
+        let all = exercises.iter().flat_map(|(_, trials)| trials.iter().copied()).collect();
+        exercises.push(("all", all));
+        for side in Side::BOTH {
+            for (exercise, trials) in &exercises {
+                for (i, contender) in contenders.iter().enumerate() {
+                    let mut found = Vec::new();
+                    for trial in trials {
+                        let errors = |i: usize| {
+                            let compared = trial.results[i].as_ref().ok()?;
+                            compared.errors.iter().find(|errors| errors.side == side)
+                        };
+                        if let Some(own) = errors(i) {
+                            found.push((own, baseline.filter(|baseline| *baseline != i).and_then(errors)));
+                        }
+                    }
+                    if found.is_empty() {
+                        continue;
+                    }
+                    let mut row = error_row(contender.name(), side, &found);
+                    row.dataset = dataset.to_owned();
+                    row.exercise = (*exercise).to_owned();
+                    rows.push(row);
+                }
+            }
+        }
+    }
+    rows
+}
+
+/// The line of a measure over trials, its place left empty; none when no trial has the measure.
+fn row_of(trials: &[&[Comparison]], measure: &'static str, sides: &[Side]) -> Option<Row> {
+    let mut agreements = Vec::new();
+    let (mut referenced, mut observed, mut intervals) = (0, 0, (0, 0));
+    for trial in trials {
+        let mut pooled = Agreement::default();
+        for comparison in trial.iter().filter(|c| c.measure == measure && sides.contains(&c.side)) {
+            pooled = pooled.pooled(Agreement::between(&comparison.estimate, &comparison.reference));
+            referenced += comparison.reference.iter().filter(|v| v.is_finite()).count();
+            observed += comparison.observed;
+            intervals.0 += comparison.intervals.0;
+            intervals.1 += comparison.intervals.1;
+        }
+        if pooled.n() > 0 {
+            agreements.push(pooled);
+        }
+    }
+    if referenced == 0 {
+        return None;
+    }
+    let over_trials =
+        |number: fn(&Agreement) -> Option<f64>| median(&agreements.iter().filter_map(number).collect::<Vec<f64>>());
+    let side = match sides {
+        [side] => format!("{}_", side.name()),
+        _ => String::new(),
+    };
+    Some(Row {
+        dataset: String::new(),
+        exercise: String::new(),
+        method: "",
+        measure: format!("{side}{measure}"),
+        n_trials: agreements.len(),
+        n_failed: 0,
+        n_frames: agreements.iter().map(Agreement::n).sum(),
+        coverage: observed as f64 / referenced as f64,
+        mae_deg: over_trials(Agreement::mae),
+        rmse_deg: over_trials(Agreement::rmse),
+        rmse_without_offset_deg: over_trials(Agreement::rmse_without_offset),
+        correlation: over_trials(Agreement::correlation),
+        interval_coverage: (intervals.0 > 0).then(|| intervals.1 as f64 / intervals.0 as f64),
+    })
+}
