@@ -3,9 +3,13 @@
 //! Inside, every recording is in one convention whatever the client declared: metres, nanoseconds, the right-handed
 //! `world` frame of the sensor with y up. `docs/recording-format.md` is the page for those who write recordings.
 
+pub mod coordinates;
+pub mod decode;
+pub mod encode;
 pub mod error;
 pub mod skeleton;
 
+pub use decode::{Format, Inspection, Inspector, Limits, decode};
 pub use error::DecodeError;
 pub use skeleton::{ReferenceSeries, SkeletonRecording};
 

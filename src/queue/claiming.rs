@@ -1,0 +1,146 @@
+//! Out of the queue, for a while: claims, leases, heartbeats.
+
+use super::job::job_from_row;
+use super::{Job, JobError, Queue, WORKER_LOST};
+use crate::progress::{Progress, Step};
+use crate::storage::clock::ms_from_time;
+use crate::storage::{JobId, StorageError, row};
+use sqlx::{Row, SqliteConnection};
+use time::OffsetDateTime;
+
+/// What a worker learns when it renews its lease.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Renewal {
+    /// The job is still the worker's.
+    Held,
+    /// The job is somebody else's or over: stop, and write nothing.
+    Lost,
+    /// The job is still the worker's, and somebody asks to stop it.
+    CancelRequested,
+}
+
+impl Queue {
+    /// Takes the job that has waited longest, counts the attempt and starts its lease; `None` when none is due.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn claim(&self, worker: &str) -> Result<Option<Job>, StorageError> {
+        let now = self.store.now();
+        let mut transaction = self.store.begin().await?;
+        let ended = end_lost_jobs(&mut transaction, now).await?;
+        // One statement: between the choice and the change there is no moment for another worker.
+        let claimed: Option<JobId> = sqlx::query_scalar(
+            "UPDATE jobs SET state = 'running', attempt = attempt + 1, worker = ?1, due_at = ?2, started_at = ?3,
+                             progress_step = 'waiting', progress_done = 0, progress_total = 0
+             WHERE id = (SELECT id FROM jobs WHERE due_at <= ?3 ORDER BY due_at, id LIMIT 1)
+             RETURNING id",
+        )
+        .bind(worker)
+        .bind(ms_from_time(now + self.settings.lease))
+        .bind(ms_from_time(now))
+        .fetch_optional(&mut *transaction)
+        .await?;
+        let Some(id) = claimed else {
+            // Without lost jobs nothing was written: no commit, no sync of the disk on every idle look.
+            if !ended.is_empty() {
+                transaction.commit().await?;
+            }
+            ended.into_iter().for_each(|id| self.announce(id));
+            return Ok(None);
+        };
+        let row = sqlx::query(
+            "SELECT j.*, r.session_id, NULL AS assessment_id
+             FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = ?1",
+        )
+        .bind(id)
+        .fetch_one(&mut *transaction)
+        .await?;
+        let job = job_from_row(&row)?;
+        transaction.commit().await?;
+        ended.into_iter().chain([id]).for_each(|id| self.announce(id));
+        Ok(Some(job))
+    }
+
+    /// Says that attempt `attempt` of a job is alive, and how far it is.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn renew(&self, id: JobId, attempt: u32, progress: Progress) -> Result<Renewal, StorageError> {
+        let due_at = self.store.now() + self.settings.lease;
+        let mut transaction = self.store.begin().await?;
+        let row = sqlx::query(
+            "UPDATE jobs SET due_at = ?3, progress_step = ?4, progress_done = ?5, progress_total = ?6
+             WHERE id = ?1 AND attempt = ?2 AND state = 'running' RETURNING cancel_requested",
+        )
+        .bind(id)
+        .bind(attempt)
+        .bind(ms_from_time(due_at))
+        .bind(step_name(progress.step))
+        .bind(i64::try_from(progress.done).unwrap_or(i64::MAX))
+        .bind(i64::try_from(progress.total).unwrap_or(i64::MAX))
+        .fetch_optional(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        let Some(row) = row else { return Ok(Renewal::Lost) };
+        self.announce(id);
+        Ok(if row.try_get("cancel_requested")? { Renewal::CancelRequested } else { Renewal::Held })
+    }
+
+    /// Gives a claimed job back untouched, without counting the attempt: the worker is shutting down.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn release(&self, id: JobId, attempt: u32) -> Result<(), StorageError> {
+        let mut transaction = self.store.begin().await?;
+        let released = sqlx::query(
+            "UPDATE jobs SET state = 'queued', attempt = attempt - 1, due_at = ?3, worker = NULL, started_at = NULL,
+                             progress_step = 'waiting', progress_done = 0, progress_total = 0
+             WHERE id = ?1 AND attempt = ?2 AND state = 'running'",
+        )
+        .bind(id)
+        .bind(attempt)
+        .bind(ms_from_time(self.store.now()))
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        if released.rows_affected() > 0 {
+            self.wake.notify_one();
+            self.announce(id);
+        }
+        Ok(())
+    }
+}
+
+/// Ends the jobs whose lease ran out and that must not run again: somebody asked to stop them, or they have been begun
+/// as often as they may. All others with an expired lease are simply due.
+async fn end_lost_jobs(connection: &mut SqliteConnection, now: OffsetDateTime) -> Result<Vec<JobId>, StorageError> {
+    let error = JobError::new(
+        WORKER_LOST,
+        "the process that computed this recording stopped without an answer, at every attempt; \
+         the recording may need more memory than the server has",
+    );
+    let ended = sqlx::query_scalar(
+        "UPDATE jobs SET state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'failed' END,
+                         error = CASE WHEN cancel_requested THEN error ELSE ?2 END,
+                         due_at = NULL, finished_at = ?1
+         WHERE state = 'running' AND due_at <= ?1 AND (cancel_requested OR attempt >= max_attempts)
+         RETURNING id",
+    )
+    .bind(ms_from_time(now))
+    .bind(row::readable_json("a job's error", &error)?)
+    .fetch_all(connection)
+    .await?;
+    Ok(ended)
+}
+
+fn step_name(step: Step) -> &'static str {
+    match step {
+        Step::Waiting => "waiting",
+        Step::Decoding => "decoding",
+        Step::Calibrating => "calibrating",
+        Step::Estimating => "estimating",
+        Step::Smoothing => "smoothing",
+        Step::Summarizing => "summarizing",
+        Step::Saving => "saving",
+    }
+}

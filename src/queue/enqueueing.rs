@@ -1,0 +1,84 @@
+//! Into the queue.
+
+use super::job::job_from_row;
+use super::{Job, Queue};
+use crate::assessment::Settings;
+use crate::storage::clock::ms_from_time;
+use crate::storage::{Access, JobId, NewRecording, RecordingId, StorageError, StoredRecording, recordings, row};
+use sqlx::SqliteConnection;
+
+impl Queue {
+    /// Stores a recording and the job to assess it, both or neither, and wakes a worker.
+    ///
+    /// # Errors
+    /// `NotFound` (`session`) when the session is out of the caller's reach.
+    pub async fn submit(
+        &self,
+        access: &Access,
+        new: &NewRecording,
+        settings: &Settings,
+    ) -> Result<(StoredRecording, Job), StorageError> {
+        let mut transaction = self.store.begin().await?;
+        let recording = recordings::insert(&mut transaction, access, new, self.store.now()).await?;
+        let job = self.insert(&mut transaction, access, recording.id, settings).await?;
+        transaction.commit().await?;
+        self.wake.notify_one();
+        self.announce(job.id);
+        Ok((recording, job))
+    }
+
+    /// Asks for another assessment of a recording that is already stored.
+    ///
+    /// # Errors
+    /// `NotFound` (`recording`) when the recording is out of the caller's reach.
+    pub async fn enqueue(
+        &self,
+        access: &Access,
+        recording: RecordingId,
+        settings: &Settings,
+    ) -> Result<Job, StorageError> {
+        let mut transaction = self.store.begin().await?;
+        let job = self.insert(&mut transaction, access, recording, settings).await?;
+        transaction.commit().await?;
+        self.wake.notify_one();
+        self.announce(job.id);
+        Ok(job)
+    }
+
+    async fn insert(
+        &self,
+        connection: &mut SqliteConnection,
+        access: &Access,
+        recording: RecordingId,
+        settings: &Settings,
+    ) -> Result<Job, StorageError> {
+        let now = ms_from_time(self.store.now());
+        let id = JobId::new();
+        let inserted = sqlx::query(
+            "INSERT INTO jobs (id, recording_id, state, max_attempts, due_at, settings, queued_at)
+             SELECT ?1, r.id, 'queued', ?5, ?6, ?7, ?6
+             FROM recordings r JOIN sessions s ON s.id = r.session_id
+             WHERE s.organisation_id = ?2 AND (?3 IS NULL OR s.created_by = ?3) AND r.id = ?4",
+        )
+        .bind(id)
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(recording)
+        .bind(self.settings.max_attempts)
+        .bind(now)
+        .bind(row::readable_json("the settings", settings)?)
+        .execute(&mut *connection)
+        .await?;
+        if inserted.rows_affected() == 0 {
+            return Err(StorageError::not_found("recording"));
+        }
+        let row = sqlx::query(
+            "SELECT j.*, r.session_id, NULL AS assessment_id
+             FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = ?1",
+        )
+        .bind(id)
+        .fetch_one(connection)
+        .await?;
+        job_from_row(&row)
+    }
+}

@@ -1,0 +1,71 @@
+//! Looking at jobs.
+
+use super::job::job_from_row;
+use super::{Job, JobFilter, JobState, Queue};
+use crate::storage::{Access, JobId, Page, PageRequest, StorageError, row};
+
+impl Queue {
+    /// One job within the caller's reach.
+    ///
+    /// # Errors
+    /// `NotFound` when there is none.
+    pub async fn job(&self, access: &Access, id: JobId) -> Result<Job, StorageError> {
+        let row = sqlx::query(
+            "SELECT j.*, r.session_id, a.id AS assessment_id
+             FROM jobs j JOIN recordings r ON r.id = j.recording_id JOIN sessions s ON s.id = r.session_id
+                  LEFT JOIN assessments a ON a.job_id = j.id
+             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND j.id = ?3",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(id)
+        .fetch_optional(self.store.reader())
+        .await?
+        .ok_or(StorageError::not_found("job"))?;
+        job_from_row(&row)
+    }
+
+    /// The jobs within the caller's reach, newest first.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn jobs(
+        &self,
+        access: &Access,
+        filter: &JobFilter,
+        page: &PageRequest<JobId>,
+    ) -> Result<Page<Job, JobId>, StorageError> {
+        let rows = sqlx::query(
+            "SELECT j.*, r.session_id, a.id AS assessment_id
+             FROM jobs j JOIN recordings r ON r.id = j.recording_id JOIN sessions s ON s.id = r.session_id
+                  LEFT JOIN assessments a ON a.job_id = j.id
+             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
+               AND (?3 IS NULL OR j.id < ?3)
+               AND (?4 IS NULL OR j.state = ?4)
+               AND (?5 IS NULL OR j.recording_id = ?5)
+             ORDER BY j.id DESC LIMIT ?6",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(page.after)
+        .bind(filter.state.map(JobState::name))
+        .bind(filter.recording_id)
+        .bind(page.rows())
+        .fetch_all(self.store.reader())
+        .await?;
+        let jobs = rows.iter().map(job_from_row).collect::<Result<_, _>>()?;
+        Ok(Page::from_rows(jobs, page, |job| job.id))
+    }
+
+    /// How many jobs of all organisations are in each state, for the operator's metrics. States without a job are left
+    /// out.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn counts(&self) -> Result<Vec<(JobState, u64)>, StorageError> {
+        let rows = sqlx::query("SELECT state, count(*) AS jobs FROM jobs GROUP BY state")
+            .fetch_all(self.store.reader())
+            .await?;
+        rows.iter().map(|row| Ok((row::word(row, "state")?, row::count(row, "jobs")?))).collect()
+    }
+}

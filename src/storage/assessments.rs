@@ -1,0 +1,227 @@
+//! Assessments: what one pipeline found in one recording. Written once, together with the end of its job, and never
+//! changed.
+
+use super::clock::ms_from_time;
+use super::series::{self, EncodedSeries};
+use super::{
+    Access, AssessmentId, JobId, Page, PageRequest, PatientId, RecordingId, SessionId, StorageError, Store, row,
+};
+use crate::assessment::{Assessment, ChannelSummary, Provenance, Quality};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+use time::OffsetDateTime;
+
+/// An assessment without its series; [`Store::series_of_assessment`] brings those.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredAssessment {
+    /// Identity.
+    pub id: AssessmentId,
+    /// The recording that was assessed.
+    pub recording_id: RecordingId,
+    /// The recording's session.
+    pub session_id: SessionId,
+    /// The session's patient.
+    pub patient_id: PatientId,
+    /// The job that made it.
+    pub job_id: JobId,
+    /// The pipeline.
+    pub pipeline: String,
+    /// The method within the pipeline.
+    pub method: String,
+    /// Names of the series.
+    pub channels: Vec<String>,
+    /// One line per series.
+    pub summary: Vec<ChannelSummary>,
+    /// How far the result can be trusted.
+    pub quality: Quality,
+    /// What is needed to compute the same bytes again; the settings are in it.
+    pub provenance: Provenance,
+    /// Samples of each series.
+    pub n_samples: u64,
+    /// Time of the first sample, nanoseconds on the recording's clock; `None` without samples.
+    pub start_time_ns: Option<i64>,
+    /// Time of the last sample.
+    pub end_time_ns: Option<i64>,
+    /// When it was stored.
+    pub created_at: OffsetDateTime,
+}
+
+/// Which assessments are wanted; the default is all.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct AssessmentFilter {
+    /// Of this recording.
+    pub recording_id: Option<RecordingId>,
+    /// Of this session.
+    pub session_id: Option<SessionId>,
+    /// Of this patient.
+    pub patient_id: Option<PatientId>,
+    /// By this pipeline.
+    pub pipeline: Option<String>,
+    /// By this method.
+    pub method: Option<String>,
+}
+
+fn assessment_from_row(row: &SqliteRow) -> Result<StoredAssessment, StorageError> {
+    Ok(StoredAssessment {
+        id: row.try_get("id")?,
+        recording_id: row.try_get("recording_id")?,
+        session_id: row.try_get("session_id")?,
+        patient_id: row.try_get("patient_id")?,
+        job_id: row.try_get("job_id")?,
+        pipeline: row.try_get("pipeline")?,
+        method: row.try_get("method")?,
+        channels: row::json(row, "channels")?,
+        summary: row::json(row, "summary")?,
+        quality: row::json(row, "quality")?,
+        provenance: row::json(row, "provenance")?,
+        n_samples: row::count(row, "n_samples")?,
+        start_time_ns: row.try_get("start_time_ns")?,
+        end_time_ns: row.try_get("end_time_ns")?,
+        created_at: row::time(row, "created_at")?,
+    })
+}
+
+/// An assessment in the form in which it is inserted.
+#[derive(Debug)]
+pub(crate) struct EncodedAssessment {
+    pipeline: &'static str,
+    method: String,
+    channels: String,
+    summary: String,
+    quality: String,
+    provenance: String,
+    n_samples: i64,
+    start_time_ns: Option<i64>,
+    end_time_ns: Option<i64>,
+    series: EncodedSeries,
+}
+
+impl EncodedAssessment {
+    /// Codes an assessment: computation only, to be done before the transaction.
+    pub(crate) fn encode(assessment: &Assessment) -> Result<Self, StorageError> {
+        let channels: Vec<String> = assessment.series.iter().map(|series| series.channel.clone()).collect();
+        Ok(Self {
+            pipeline: assessment.pipeline,
+            method: assessment.provenance.method.clone(),
+            channels: row::readable_json("the channel names", &channels)?,
+            summary: row::readable_json("the summary", &assessment.summary)?,
+            quality: row::readable_json("the quality", &assessment.quality)?,
+            provenance: row::readable_json("the provenance", &assessment.provenance)?,
+            n_samples: assessment.time_ns.len() as i64,
+            start_time_ns: assessment.time_ns.first().copied(),
+            end_time_ns: assessment.time_ns.last().copied(),
+            series: EncodedSeries::encode(assessment)?,
+        })
+    }
+}
+
+/// Inserts an assessment inside the transaction that ends its job.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    recording_id: RecordingId,
+    job_id: JobId,
+    encoded: &EncodedAssessment,
+    now: OffsetDateTime,
+) -> Result<AssessmentId, StorageError> {
+    let id = AssessmentId::new();
+    sqlx::query(
+        "INSERT INTO assessments (id, recording_id, job_id, pipeline, method, channels, summary, quality, provenance,
+                                  n_samples, start_time_ns, end_time_ns, created_at)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
+    )
+    .bind(id)
+    .bind(recording_id)
+    .bind(job_id)
+    .bind(encoded.pipeline)
+    .bind(&encoded.method)
+    .bind(&encoded.channels)
+    .bind(&encoded.summary)
+    .bind(&encoded.quality)
+    .bind(&encoded.provenance)
+    .bind(encoded.n_samples)
+    .bind(encoded.start_time_ns)
+    .bind(encoded.end_time_ns)
+    .bind(ms_from_time(now))
+    .execute(&mut *connection)
+    .await?;
+    series::insert(connection, id, &encoded.series).await?;
+    Ok(id)
+}
+
+impl Store {
+    /// One assessment within the caller's reach.
+    ///
+    /// # Errors
+    /// `NotFound` when there is none.
+    pub async fn assessment(&self, access: &Access, id: AssessmentId) -> Result<StoredAssessment, StorageError> {
+        let row = sqlx::query(
+            "SELECT a.*, r.session_id, s.patient_id
+             FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
+             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(id)
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("assessment"))?;
+        assessment_from_row(&row)
+    }
+
+    /// The assessments within the caller's reach, newest first.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn assessments(
+        &self,
+        access: &Access,
+        filter: &AssessmentFilter,
+        page: &PageRequest<AssessmentId>,
+    ) -> Result<Page<StoredAssessment, AssessmentId>, StorageError> {
+        let rows = sqlx::query(
+            "SELECT a.*, r.session_id, s.patient_id
+             FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
+             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
+               AND (?3 IS NULL OR a.id < ?3)
+               AND (?4 IS NULL OR a.recording_id = ?4)
+               AND (?5 IS NULL OR r.session_id = ?5)
+               AND (?6 IS NULL OR s.patient_id = ?6)
+               AND (?7 IS NULL OR a.pipeline = ?7)
+               AND (?8 IS NULL OR a.method = ?8)
+             ORDER BY a.id DESC LIMIT ?9",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(page.after)
+        .bind(filter.recording_id)
+        .bind(filter.session_id)
+        .bind(filter.patient_id)
+        .bind(&filter.pipeline)
+        .bind(&filter.method)
+        .bind(page.rows())
+        .fetch_all(self.reader())
+        .await?;
+        let assessments = rows.iter().map(assessment_from_row).collect::<Result<_, _>>()?;
+        Ok(Page::from_rows(assessments, page, |assessment| assessment.id))
+    }
+
+    /// Names of the series of an assessment within the caller's reach.
+    pub(super) async fn channels_of_assessment(
+        &self,
+        access: &Access,
+        id: AssessmentId,
+    ) -> Result<Vec<String>, StorageError> {
+        let row = sqlx::query(
+            "SELECT a.channels
+             FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
+             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(id)
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("assessment"))?;
+        row::json(&row, "channels")
+    }
+}

@@ -1,0 +1,239 @@
+//! API clients and their keys. A key is 256 random bits; the database holds its SHA-256 only. A slow hash is for
+//! passwords: nobody guesses 256 random bits.
+
+use super::clock::ms_from_time;
+use super::{Access, ClientId, OrganisationId, StorageError, Store, organisations, row};
+use rand::TryRng;
+use rand::rngs::SysRng;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+use std::fmt;
+use time::{Duration, OffsetDateTime};
+use utoipa::ToSchema;
+
+/// Begins every key, so that people and secret scanners recognise one.
+const KEY_PREFIX: &str = "surefoot_";
+/// `last_used_at` is for people who tidy up keys: a minute is exact enough, and costs no write per request.
+const LAST_USE_RESOLUTION: Duration = Duration::MINUTE;
+/// Name of the organisation that the first start makes.
+const FIRST_ORGANISATION: &str = "default";
+
+/// What a client may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Uploads, and reads its own sessions.
+    Device,
+    /// Reads the patients of its organisation.
+    Clinician,
+    /// Everything in its organisation, keys too.
+    Admin,
+}
+
+impl Role {
+    /// The word for the role at the API, at the command line, and in the database.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Device => "device",
+            Role::Clinician => "clinician",
+            Role::Admin => "admin",
+        }
+    }
+}
+
+/// A holder of a key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Client {
+    /// Identity.
+    pub id: ClientId,
+    /// The organisation it belongs to.
+    pub organisation_id: OrganisationId,
+    /// What it may do.
+    pub role: Role,
+    /// Whose key it is, for people.
+    pub label: String,
+    /// When the key was made.
+    pub created_at: OffsetDateTime,
+    /// Since when the key opens nothing.
+    pub revoked_at: Option<OffsetDateTime>,
+    /// When the key was last used, to the minute.
+    pub last_used_at: Option<OffsetDateTime>,
+}
+
+impl Client {
+    /// How far the client reaches.
+    pub fn access(&self) -> Access {
+        Access { organisation: self.organisation_id, client: self.id, own_sessions_only: self.role == Role::Device }
+    }
+}
+
+/// The text of a key. It exists only here, at the one time it is made, and with its holder.
+#[derive(Clone, PartialEq, Eq)]
+pub struct ApiKey(String);
+
+impl ApiKey {
+    fn generate() -> Result<Self, StorageError> {
+        let mut bits = [0u8; 32];
+        SysRng.try_fill_bytes(&mut bits).map_err(|error| StorageError::Randomness(error.to_string()))?;
+        Ok(Self(format!("{KEY_PREFIX}{}", hex::encode(bits))))
+    }
+
+    /// A key as a request brings it; any text will do, but only a true key is somebody's.
+    pub fn from_text(text: &str) -> Self {
+        Self(text.to_owned())
+    }
+
+    /// The secret text, to be shown once.
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+
+    fn digest(&self) -> Vec<u8> {
+        Sha256::digest(self.0.as_bytes()).to_vec()
+    }
+}
+
+impl fmt::Debug for ApiKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("ApiKey(…)")
+    }
+}
+
+fn client_from_row(row: &SqliteRow) -> Result<Client, StorageError> {
+    Ok(Client {
+        id: row.try_get("id")?,
+        organisation_id: row.try_get("organisation_id")?,
+        role: row::word(row, "role")?,
+        label: row.try_get("label")?,
+        created_at: row::time(row, "created_at")?,
+        revoked_at: row::optional_time(row, "revoked_at")?,
+        last_used_at: row::optional_time(row, "last_used_at")?,
+    })
+}
+
+async fn insert(
+    connection: &mut SqliteConnection,
+    organisation: OrganisationId,
+    role: Role,
+    label: &str,
+    now: OffsetDateTime,
+) -> Result<(Client, ApiKey), StorageError> {
+    let key = ApiKey::generate()?;
+    let row = sqlx::query(
+        "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at)
+         SELECT ?1, o.id, ?3, ?4, ?5, ?6 FROM organisations o WHERE o.id = ?2 RETURNING *",
+    )
+    .bind(ClientId::new())
+    .bind(organisation)
+    .bind(role.name())
+    .bind(label)
+    .bind(key.digest())
+    .bind(ms_from_time(now))
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StorageError::not_found("organisation"))?;
+    Ok((client_from_row(&row)?, key))
+}
+
+impl Store {
+    /// Makes a client and its key. The key is not stored and cannot be shown again.
+    ///
+    /// # Errors
+    /// `NotFound` when the organisation does not exist.
+    pub async fn create_client(
+        &self,
+        organisation: OrganisationId,
+        role: Role,
+        label: &str,
+    ) -> Result<(Client, ApiKey), StorageError> {
+        let mut transaction = self.begin().await?;
+        let made = insert(&mut transaction, organisation, role, label, self.now()).await?;
+        transaction.commit().await?;
+        Ok(made)
+    }
+
+    /// Makes an organisation and its first admin when there is no client at all: the first start. The key is to be
+    /// shown once. Two processes that start at the same time make one admin.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn ensure_first_admin(&self) -> Result<Option<ApiKey>, StorageError> {
+        let mut transaction = self.begin().await?;
+        let clients: i64 = sqlx::query_scalar("SELECT count(*) FROM clients").fetch_one(&mut *transaction).await?;
+        if clients > 0 {
+            return Ok(None);
+        }
+        let now = self.now();
+        let existing: Option<OrganisationId> = sqlx::query_scalar("SELECT id FROM organisations ORDER BY id LIMIT 1")
+            .fetch_optional(&mut *transaction)
+            .await?;
+        let organisation = match existing {
+            Some(id) => id,
+            None => organisations::insert(&mut transaction, FIRST_ORGANISATION, now).await?.id,
+        };
+        let (_, key) = insert(&mut transaction, organisation, Role::Admin, "first admin", now).await?;
+        transaction.commit().await?;
+        Ok(Some(key))
+    }
+
+    /// Whose key this is; `None` for an unknown or revoked key.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn client_of_key(&self, key: &ApiKey) -> Result<Option<Client>, StorageError> {
+        // Comparing digests in the index leaks at most a prefix of a digest, from which no key can be made.
+        let row = sqlx::query("SELECT * FROM clients WHERE key_sha256 = ?1 AND revoked_at IS NULL")
+            .bind(key.digest())
+            .fetch_optional(self.reader())
+            .await?;
+        let Some(client) = row.as_ref().map(client_from_row).transpose()? else { return Ok(None) };
+        let now = self.now();
+        if client.last_used_at.is_none_or(|last| now - last >= LAST_USE_RESOLUTION) {
+            self.note_use(client.id, now).await?;
+        }
+        Ok(Some(client))
+    }
+
+    async fn note_use(&self, client: ClientId, now: OffsetDateTime) -> Result<(), StorageError> {
+        let mut transaction = self.begin().await?;
+        sqlx::query("UPDATE clients SET last_used_at = max(coalesce(last_used_at, ?2), ?2) WHERE id = ?1")
+            .bind(client)
+            .bind(ms_from_time(now))
+            .execute(&mut *transaction)
+            .await?;
+        Ok(transaction.commit().await?)
+    }
+
+    /// The clients of the organisation, oldest first, revoked ones too.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn clients(&self, organisation: OrganisationId) -> Result<Vec<Client>, StorageError> {
+        let rows = sqlx::query("SELECT * FROM clients WHERE organisation_id = ?1 ORDER BY id")
+            .bind(organisation)
+            .fetch_all(self.reader())
+            .await?;
+        rows.iter().map(client_from_row).collect()
+    }
+
+    /// Takes a key out of use, at once. Doing it again changes nothing.
+    ///
+    /// # Errors
+    /// `NotFound` when the organisation has no such client.
+    pub async fn revoke_client(&self, organisation: OrganisationId, id: ClientId) -> Result<Client, StorageError> {
+        let mut transaction = self.begin().await?;
+        let row = sqlx::query(
+            "UPDATE clients SET revoked_at = coalesce(revoked_at, ?3) WHERE id = ?1 AND organisation_id = ?2 RETURNING *",
+        )
+        .bind(id)
+        .bind(organisation)
+        .bind(ms_from_time(self.now()))
+        .fetch_optional(&mut *transaction)
+        .await?
+        .ok_or(StorageError::not_found("client"))?;
+        transaction.commit().await?;
+        client_from_row(&row)
+    }
+}

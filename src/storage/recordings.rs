@@ -1,0 +1,187 @@
+//! Recordings: one upload in a session. The bytes are a blob; the row says which, and what is in it.
+
+use super::clock::ms_from_time;
+use super::{
+    Access, ClientId, Page, PageRequest, PatientId, RecordingId, SessionId, StorageError, Store, StoredBlob, row,
+};
+use crate::recording::Header;
+use serde::{Deserialize, Serialize};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+use time::OffsetDateTime;
+use utoipa::ToSchema;
+
+/// What was seen of a recording while it arrived, without decoding all of it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub struct Inspection {
+    /// What was recorded, with what, of whom.
+    pub header: Header,
+    /// Frames in the recording; null when not counted yet.
+    pub n_frames: Option<u64>,
+    /// Time from the first to the last frame, seconds; null when not known yet.
+    pub duration_s: Option<f64>,
+}
+
+/// A recording to be made; its bytes are already stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewRecording {
+    /// The session it belongs to.
+    pub session_id: SessionId,
+    /// Name of the container, as `recording::decode` knows it: `mcap` or `json`.
+    pub format: String,
+    /// The uploaded bytes.
+    pub blob: StoredBlob,
+    /// What was seen while they arrived.
+    pub inspection: Inspection,
+}
+
+/// A recording's row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredRecording {
+    /// Identity.
+    pub id: RecordingId,
+    /// The session it belongs to.
+    pub session_id: SessionId,
+    /// The session's patient.
+    pub patient_id: PatientId,
+    /// The client that uploaded it.
+    pub created_by: ClientId,
+    /// Name of the container: `mcap` or `json`.
+    pub format: String,
+    /// The uploaded bytes.
+    pub blob: StoredBlob,
+    /// What was seen while they arrived.
+    pub inspection: Inspection,
+    /// When it was stored.
+    pub created_at: OffsetDateTime,
+}
+
+/// Which recordings are wanted; the default is all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RecordingFilter {
+    /// Of this session.
+    pub session_id: Option<SessionId>,
+    /// Of this patient.
+    pub patient_id: Option<PatientId>,
+}
+
+fn recording_from_row(row: &SqliteRow) -> Result<StoredRecording, StorageError> {
+    Ok(StoredRecording {
+        id: row.try_get("id")?,
+        session_id: row.try_get("session_id")?,
+        patient_id: row.try_get("patient_id")?,
+        created_by: row.try_get("created_by")?,
+        format: row.try_get("format")?,
+        blob: StoredBlob {
+            key: row.try_get("blob_key")?,
+            sha256: row.try_get("sha256")?,
+            size_bytes: row::count(row, "size_bytes")?,
+        },
+        inspection: row::json(row, "inspection")?,
+        created_at: row::time(row, "created_at")?,
+    })
+}
+
+/// Inserts a recording inside the caller's transaction, so that its job can stand or fall with it.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    access: &Access,
+    new: &NewRecording,
+    now: OffsetDateTime,
+) -> Result<StoredRecording, StorageError> {
+    let patient_id: PatientId = sqlx::query_scalar(
+        "SELECT patient_id FROM sessions WHERE organisation_id = ?1 AND (?2 IS NULL OR created_by = ?2) AND id = ?3",
+    )
+    .bind(access.organisation)
+    .bind(access.only_sessions_of())
+    .bind(new.session_id)
+    .fetch_optional(&mut *connection)
+    .await?
+    .ok_or(StorageError::not_found("session"))?;
+    let id = RecordingId::new();
+    let size = i64::try_from(new.blob.size_bytes)
+        .map_err(|_| StorageError::Corrupt(format!("a blob of {} bytes", new.blob.size_bytes)))?;
+    let row = sqlx::query(
+        "INSERT INTO recordings (id, session_id, created_by, format, size_bytes, sha256, blob_key, inspection, created_at)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) RETURNING *, ?10 AS patient_id",
+    )
+    .bind(id)
+    .bind(new.session_id)
+    .bind(access.client)
+    .bind(&new.format)
+    .bind(size)
+    .bind(&new.blob.sha256)
+    .bind(&new.blob.key)
+    .bind(row::readable_json("the inspection", &new.inspection)?)
+    .bind(ms_from_time(now))
+    .bind(patient_id)
+    .fetch_one(connection)
+    .await?;
+    recording_from_row(&row)
+}
+
+impl Store {
+    /// One recording within the caller's reach.
+    ///
+    /// # Errors
+    /// `NotFound` when there is none.
+    pub async fn recording(&self, access: &Access, id: RecordingId) -> Result<StoredRecording, StorageError> {
+        let row = sqlx::query(
+            "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
+             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND r.id = ?3",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(id)
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("recording"))?;
+        recording_from_row(&row)
+    }
+
+    /// The recordings within the caller's reach, newest first.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn recordings(
+        &self,
+        access: &Access,
+        filter: &RecordingFilter,
+        page: &PageRequest<RecordingId>,
+    ) -> Result<Page<StoredRecording, RecordingId>, StorageError> {
+        let rows = sqlx::query(
+            "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
+             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
+               AND (?3 IS NULL OR r.id < ?3)
+               AND (?4 IS NULL OR r.session_id = ?4)
+               AND (?5 IS NULL OR s.patient_id = ?5)
+             ORDER BY r.id DESC LIMIT ?6",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(page.after)
+        .bind(filter.session_id)
+        .bind(filter.patient_id)
+        .bind(page.rows())
+        .fetch_all(self.reader())
+        .await?;
+        let recordings = rows.iter().map(recording_from_row).collect::<Result<_, _>>()?;
+        Ok(Page::from_rows(recordings, page, |recording| recording.id))
+    }
+
+    /// The recording that a job is about, for the worker, which serves every organisation.
+    ///
+    /// # Errors
+    /// `NotFound` when there is none.
+    pub async fn recording_to_assess(&self, id: RecordingId) -> Result<StoredRecording, StorageError> {
+        let row = sqlx::query(
+            "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = ?1",
+        )
+        .bind(id)
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("recording"))?;
+        recording_from_row(&row)
+    }
+}

@@ -1,0 +1,143 @@
+//! Sessions: one sitting of a patient at home.
+
+use super::clock::ms_from_time;
+use super::{Access, ClientId, Page, PageRequest, PatientId, SessionId, StorageError, Store, row};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use time::OffsetDateTime;
+
+/// A session to be made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewSession {
+    /// Whose session it is.
+    pub patient_id: PatientId,
+    /// When it began, to the millisecond.
+    pub started_at: OffsetDateTime,
+    /// The exercise programme or test.
+    pub protocol: Option<String>,
+    /// Remarks of whoever made it.
+    pub notes: Option<String>,
+}
+
+/// A session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Session {
+    /// Identity.
+    pub id: SessionId,
+    /// Whose session it is.
+    pub patient_id: PatientId,
+    /// The client that made it; a device sees only its own.
+    pub created_by: ClientId,
+    /// When it began, to the millisecond.
+    pub started_at: OffsetDateTime,
+    /// The exercise programme or test.
+    pub protocol: Option<String>,
+    /// Remarks of whoever made it.
+    pub notes: Option<String>,
+    /// When the row was made.
+    pub created_at: OffsetDateTime,
+}
+
+/// Which sessions are wanted; the default is all.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct SessionFilter {
+    /// Of this patient.
+    pub patient_id: Option<PatientId>,
+    /// Begun at this time or later.
+    pub started_from: Option<OffsetDateTime>,
+    /// Begun before this time.
+    pub started_before: Option<OffsetDateTime>,
+    /// Of exactly this protocol.
+    pub protocol: Option<String>,
+}
+
+fn session_from_row(row: &SqliteRow) -> Result<Session, StorageError> {
+    Ok(Session {
+        id: row.try_get("id")?,
+        patient_id: row.try_get("patient_id")?,
+        created_by: row.try_get("created_by")?,
+        started_at: row::time(row, "started_at")?,
+        protocol: row.try_get("protocol")?,
+        notes: row.try_get("notes")?,
+        created_at: row::time(row, "created_at")?,
+    })
+}
+
+impl Store {
+    /// Makes a session of a patient of the organisation.
+    ///
+    /// # Errors
+    /// `NotFound` when the organisation has no such patient.
+    pub async fn create_session(&self, access: &Access, new: &NewSession) -> Result<Session, StorageError> {
+        let mut transaction = self.begin().await?;
+        let row = sqlx::query(
+            "INSERT INTO sessions (id, organisation_id, patient_id, created_by, started_at, protocol, notes, created_at)
+             SELECT ?1, p.organisation_id, p.id, ?4, ?5, ?6, ?7, ?8 FROM patients p
+             WHERE p.organisation_id = ?2 AND p.id = ?3 RETURNING *",
+        )
+        .bind(SessionId::new())
+        .bind(access.organisation)
+        .bind(new.patient_id)
+        .bind(access.client)
+        .bind(ms_from_time(new.started_at))
+        .bind(&new.protocol)
+        .bind(&new.notes)
+        .bind(ms_from_time(self.now()))
+        .fetch_optional(&mut *transaction)
+        .await?
+        .ok_or(StorageError::not_found("patient"))?;
+        transaction.commit().await?;
+        session_from_row(&row)
+    }
+
+    /// One session within the caller's reach.
+    ///
+    /// # Errors
+    /// `NotFound` when there is none.
+    pub async fn session(&self, access: &Access, id: SessionId) -> Result<Session, StorageError> {
+        let row = sqlx::query(
+            "SELECT * FROM sessions WHERE organisation_id = ?1 AND (?2 IS NULL OR created_by = ?2) AND id = ?3",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(id)
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("session"))?;
+        session_from_row(&row)
+    }
+
+    /// The sessions within the caller's reach, newest first.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn sessions(
+        &self,
+        access: &Access,
+        filter: &SessionFilter,
+        page: &PageRequest<SessionId>,
+    ) -> Result<Page<Session, SessionId>, StorageError> {
+        let rows = sqlx::query(
+            "SELECT * FROM sessions
+             WHERE organisation_id = ?1 AND (?2 IS NULL OR created_by = ?2)
+               AND (?3 IS NULL OR id < ?3)
+               AND (?4 IS NULL OR patient_id = ?4)
+               AND (?5 IS NULL OR started_at >= ?5)
+               AND (?6 IS NULL OR started_at < ?6)
+               AND (?7 IS NULL OR protocol = ?7)
+             ORDER BY id DESC LIMIT ?8",
+        )
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(page.after)
+        .bind(filter.patient_id)
+        .bind(filter.started_from.map(ms_from_time))
+        .bind(filter.started_before.map(ms_from_time))
+        .bind(&filter.protocol)
+        .bind(page.rows())
+        .fetch_all(self.reader())
+        .await?;
+        let sessions = rows.iter().map(session_from_row).collect::<Result<_, _>>()?;
+        Ok(Page::from_rows(sessions, page, |session| session.id))
+    }
+}
