@@ -51,7 +51,6 @@ CREATE TABLE recordings (
     id BLOB NOT NULL PRIMARY KEY CHECK (length(id) = 16),
     session_id BLOB NOT NULL REFERENCES sessions (id),
     created_by BLOB NOT NULL REFERENCES clients (id),
-    format TEXT NOT NULL,
     size_bytes INTEGER NOT NULL CHECK (size_bytes >= 0),
     sha256 TEXT NOT NULL CHECK (length(sha256) = 64),
     blob_key TEXT NOT NULL,

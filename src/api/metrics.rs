@@ -56,7 +56,7 @@ pub fn router() -> OpenApiRouter<AppState> {
     responses((status = 200, description = "The numbers", body = String, content_type = "text/plain")))]
 async fn read_metrics(State(state): State<AppState>) -> Result<Response, ApiError> {
     for (job_state, count) in state.queue.counts().await? {
-        metrics::gauge!(JOBS, "state" => job_state).set(count as f64);
+        metrics::gauge!(JOBS, "state" => job_state.name()).set(count as f64);
     }
     let content_type = (header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8");
     Ok(([content_type], state.metrics.render()).into_response())

@@ -42,7 +42,7 @@ use utoipa_axum::router::OpenApiRouter;
 /// given up when nothing arrives for a while.
 const ORDINARY_TIMEOUT: Duration = Duration::from_secs(30);
 /// Answers below this size are cheaper to send than to compress, bytes.
-const COMPRESS_ABOVE: u16 = 4096;
+const COMPRESS_ABOVE: u64 = 4096;
 /// Headers that no log shows.
 const SECRET_HEADERS: [HeaderName; 2] = [header::AUTHORIZATION, header::COOKIE];
 

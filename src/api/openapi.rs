@@ -63,14 +63,17 @@ pub(super) fn complete(document: &OpenApi) -> Value {
         for (path, item) in paths {
             for operation in item.as_object_mut().into_iter().flat_map(|item| item.values_mut()) {
                 document_refusals(path, operation);
-                let parameters = operation["parameters"].as_array_mut();
+                let parameters = operation.get_mut("parameters").and_then(Value::as_array_mut);
                 parameters.into_iter().flatten().for_each(absent_is_not_null);
             }
         }
     }
     let schemas = document["components"]["schemas"].clone();
     if let Some(settled) = document["components"]["schemas"].as_object_mut() {
-        settled.values_mut().for_each(|schema| merge_tagged_variants(schema, &schemas));
+        for schema in settled.values_mut() {
+            merge_tagged_variants(schema, &schemas);
+            drop_null_defaults(schema);
+        }
     }
     document
 }
@@ -120,7 +123,7 @@ fn absent_is_not_null(parameter: &mut Value) {
 /// Makes one closed object of each variant of a tagged enum. As "all of" a closed object and its tag, no value would
 /// do: the tag is not among the closed object's properties.
 fn merge_tagged_variants(schema: &mut Value, schemas: &Value) {
-    for variant in schema["oneOf"].as_array_mut().into_iter().flatten() {
+    for variant in schema.get_mut("oneOf").and_then(Value::as_array_mut).into_iter().flatten() {
         let Some([content, tag]) = variant["allOf"].as_array().map(Vec::as_slice) else { continue };
         let Some(name) = content["$ref"].as_str().and_then(|name| name.rsplit('/').next()) else { continue };
         let mut merged = schemas[name].clone();
@@ -129,5 +132,16 @@ fn merge_tagged_variants(schema: &mut Value, schemas: &Value) {
         }
         merged["required"] = tag["required"].clone();
         *variant = merged;
+    }
+}
+
+/// A field that may be absent has no default to be told of, least of all one that its own type does not allow.
+fn drop_null_defaults(schema: &mut Value) {
+    for property in schema.get_mut("properties").and_then(Value::as_object_mut).into_iter().flat_map(|p| p.values_mut()) {
+        if property.get("default").is_some_and(Value::is_null)
+            && let Some(property) = property.as_object_mut()
+        {
+            property.remove("default");
+        }
     }
 }

@@ -49,13 +49,13 @@ impl<T> Page<T> {
 /// Writes the address of the next page.
 #[derive(Debug, Clone)]
 pub struct PageLink {
-    path: &'static str,
+    path: String,
     query: String,
 }
 
 impl PageLink {
     /// A link to `path` that repeats the filters that are set.
-    pub fn new(path: &'static str, limit: u32, filters: &[(&str, Option<String>)]) -> Self {
+    pub fn new(path: impl Into<String>, limit: u32, filters: &[(&str, Option<String>)]) -> Self {
         let mut query = format!("limit={limit}");
         for (name, value) in filters {
             if let Some(value) = value {
@@ -63,7 +63,7 @@ impl PageLink {
                 query.push_str(&format!("&{name}={value}"));
             }
         }
-        Self { path, query }
+        Self { path: path.into(), query }
     }
 
     fn after(&self, id: Uuid) -> String {

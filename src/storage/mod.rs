@@ -39,7 +39,7 @@ pub use idempotency::{IdempotencyClaim, StoredResponse};
 pub use organisations::Organisation;
 pub use page::{Page, PageRequest};
 pub use patients::{NewPatient, Patient, PatientFilter, Sex};
-pub use recordings::{Inspection, NewRecording, RecordingFilter, StoredRecording};
+pub use recordings::{NewRecording, RecordingFilter, StoredRecording};
 pub use series::{Parts, SeriesQuery, SeriesSlice};
 pub use sessions::{NewSession, Session, SessionFilter};
 

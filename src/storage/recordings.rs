@@ -4,35 +4,19 @@ use super::clock::ms_from_time;
 use super::{
     Access, ClientId, Page, PageRequest, PatientId, RecordingId, SessionId, StorageError, Store, StoredBlob, row,
 };
-use crate::recording::Header;
-use serde::{Deserialize, Serialize};
+use crate::recording::decode::Inspection;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
-use utoipa::ToSchema;
-
-/// What was seen of a recording while it arrived, without decoding all of it.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
-#[serde(default)]
-pub struct Inspection {
-    /// What was recorded, with what, of whom.
-    pub header: Header,
-    /// Frames in the recording; null when not counted yet.
-    pub n_frames: Option<u64>,
-    /// Time from the first to the last frame, seconds; null when not known yet.
-    pub duration_s: Option<f64>,
-}
 
 /// A recording to be made; its bytes are already stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewRecording {
     /// The session it belongs to.
     pub session_id: SessionId,
-    /// Name of the container, as `recording::decode` knows it: `mcap` or `json`.
-    pub format: String,
     /// The uploaded bytes.
     pub blob: StoredBlob,
-    /// What was seen while they arrived.
+    /// What was seen while they arrived, the format among it.
     pub inspection: Inspection,
 }
 
@@ -47,11 +31,9 @@ pub struct StoredRecording {
     pub patient_id: PatientId,
     /// The client that uploaded it.
     pub created_by: ClientId,
-    /// Name of the container: `mcap` or `json`.
-    pub format: String,
     /// The uploaded bytes.
     pub blob: StoredBlob,
-    /// What was seen while they arrived.
+    /// What was seen while they arrived, the format among it.
     pub inspection: Inspection,
     /// When it was stored.
     pub created_at: OffsetDateTime,
@@ -72,7 +54,6 @@ fn recording_from_row(row: &SqliteRow) -> Result<StoredRecording, StorageError> 
         session_id: row.try_get("session_id")?,
         patient_id: row.try_get("patient_id")?,
         created_by: row.try_get("created_by")?,
-        format: row.try_get("format")?,
         blob: StoredBlob {
             key: row.try_get("blob_key")?,
             sha256: row.try_get("sha256")?,
@@ -103,13 +84,12 @@ pub(crate) async fn insert(
     let size = i64::try_from(new.blob.size_bytes)
         .map_err(|_| StorageError::Corrupt(format!("a blob of {} bytes", new.blob.size_bytes)))?;
     let row = sqlx::query(
-        "INSERT INTO recordings (id, session_id, created_by, format, size_bytes, sha256, blob_key, inspection, created_at)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) RETURNING *, ?10 AS patient_id",
+        "INSERT INTO recordings (id, session_id, created_by, size_bytes, sha256, blob_key, inspection, created_at)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) RETURNING *, ?9 AS patient_id",
     )
     .bind(id)
     .bind(new.session_id)
     .bind(access.client)
-    .bind(&new.format)
     .bind(size)
     .bind(&new.blob.sha256)
     .bind(&new.blob.key)

@@ -150,7 +150,7 @@ async fn read_series(
     if tag.is_known(&headers) {
         return Ok(tag.not_modified());
     }
-    let slice = state.store.series(&caller.access, path.id, &query).await?;
+    let slice = state.store.series_of_assessment(&caller.access, path.id, &query).await?;
     let writing = tokio::task::spawn_blocking(move || match form {
         Form::Json => ("application/json", write::json(&assessment, &slice)),
         Form::Csv => ("text/csv; charset=utf-8", write::csv(&slice)),
