@@ -86,14 +86,18 @@ impl Queue {
         Ok(if row.try_get("cancel_requested")? { Renewal::CancelRequested } else { Renewal::Held })
     }
 
-    /// Gives a claimed job back untouched, without counting the attempt: the worker is shutting down.
+    /// Gives a claimed job back untouched: the worker is shutting down. The job may be begun once more instead, because
+    /// an attempt's number is a fence and must never be given out twice.
     ///
     /// # Errors
     /// When the database fails.
     pub async fn release(&self, id: JobId, attempt: u32) -> Result<(), StorageError> {
         let mut transaction = self.store.begin().await?;
         let released = sqlx::query(
-            "UPDATE jobs SET state = 'queued', attempt = attempt - 1, due_at = ?3, worker = NULL, started_at = NULL,
+            "UPDATE jobs SET state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'queued' END,
+                             due_at = CASE WHEN cancel_requested THEN NULL ELSE ?3 END,
+                             finished_at = CASE WHEN cancel_requested THEN ?3 END,
+                             max_attempts = max_attempts + 1, worker = NULL, started_at = NULL,
                              progress_step = 'waiting', progress_done = 0, progress_total = 0
              WHERE id = ?1 AND attempt = ?2 AND state = 'running'",
         )

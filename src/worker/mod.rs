@@ -1,1 +1,211 @@
 //! The worker: claim a job, load its recording, assess, save.
+//!
+//! The computation runs on a blocking thread, so a panic in it is a failed job and not a lost worker. Meanwhile the
+//! async side renews the lease, writes the progress, and passes on the request to stop: from a client, from the
+//! operator who shuts the process down, or because the job has become somebody else's.
+
+mod assessing;
+
+pub use assessing::{AttemptError, assess_recording};
+
+use crate::assessment::{Assessment, Settings};
+use crate::progress::{Monitor, Step};
+use crate::queue::{Failure, Finish, Job, JobError, Queue, Renewal};
+use crate::recording::decode::Limits;
+use crate::storage::{BlobReader, JobId, StorageError, StoredRecording};
+use std::fmt;
+use std::pin::pin;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::task::{JoinHandle, JoinSet, spawn_blocking};
+use tokio::time::MissedTickBehavior;
+use tokio_util::sync::CancellationToken;
+
+/// How often progress is written and the request to stop is seen.
+const HEARTBEAT: Duration = Duration::from_millis(250);
+/// How often an idle worker looks without being woken: for the end of back-offs and expired leases, and for jobs that
+/// another process has stored.
+const POLL: Duration = Duration::from_secs(1);
+
+/// The computation of one attempt, on a blocking thread.
+pub type Assess =
+    dyn Fn(BlobReader, &StoredRecording, &Settings, &Monitor) -> Result<Assessment, AttemptError> + Send + Sync;
+
+/// What one look at the queue came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ran {
+    /// One attempt of this job was run, whatever its outcome.
+    Job(JobId),
+    /// No job was due.
+    QueueEmpty,
+}
+
+/// One worker: runs one job at a time.
+#[derive(Clone)]
+pub struct Worker {
+    queue: Queue,
+    name: String,
+    assess: Arc<Assess>,
+    heartbeat: Duration,
+    shutdown: CancellationToken,
+}
+
+impl fmt::Debug for Worker {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Worker").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+/// Starts `count` workers. Each ends after `shutdown`; a job that is under way then goes back to the queue.
+pub fn spawn(queue: &Queue, count: usize, limits: &Limits, shutdown: &CancellationToken) -> JoinSet<()> {
+    let mut workers = JoinSet::new();
+    for number in 1..=count {
+        let name = format!("{}-{number}", std::process::id());
+        let worker = Worker::new(queue.clone(), name, limits.clone(), shutdown.clone());
+        workers.spawn(async move { worker.run().await });
+    }
+    workers
+}
+
+impl Worker {
+    /// A worker that decodes recordings and runs the pipelines.
+    pub fn new(queue: Queue, name: impl Into<String>, limits: Limits, shutdown: CancellationToken) -> Self {
+        let heartbeat = HEARTBEAT.min(queue.settings().lease.unsigned_abs() / 4);
+        let assess =
+            Arc::new(move |reader: BlobReader, recording: &StoredRecording, settings: &Settings, monitor: &Monitor| {
+                assess_recording(reader, recording, settings, &limits, monitor)
+            });
+        Self { queue, name: name.into(), assess, heartbeat, shutdown }
+    }
+
+    /// The same worker with another computation.
+    #[must_use]
+    pub fn with_assess(mut self, assess: Arc<Assess>) -> Self {
+        self.assess = assess;
+        self
+    }
+
+    /// The same worker with another time between heartbeats.
+    #[must_use]
+    pub fn with_heartbeat(mut self, heartbeat: Duration) -> Self {
+        self.heartbeat = heartbeat;
+        self
+    }
+
+    /// Runs jobs until the shutdown.
+    pub async fn run(&self) {
+        while !self.shutdown.is_cancelled() {
+            // Registered before the look: a job that comes in between wakes this worker at once.
+            let mut woken = pin!(self.queue.woken());
+            woken.as_mut().enable();
+            match self.run_next().await {
+                Ok(Ran::Job(_)) => continue,
+                Ok(Ran::QueueEmpty) => {}
+                Err(error) => tracing::error!(worker = %self.name, %error, "the queue could not be asked for a job"),
+            }
+            tokio::select! {
+                () = woken => {}
+                () = tokio::time::sleep(POLL) => {}
+                () = self.shutdown.cancelled() => {}
+            }
+        }
+    }
+
+    /// Claims one job and runs one attempt of it to its end.
+    ///
+    /// # Errors
+    /// When the database fails; a claimed job runs again then, after its lease.
+    pub async fn run_next(&self) -> Result<Ran, StorageError> {
+        let Some(job) = self.queue.claim(&self.name).await? else { return Ok(Ran::QueueEmpty) };
+        let monitor = Monitor::default();
+        match self.attempt(&job, &monitor).await {
+            Ok(assessment) => self.save(&job, assessment, &monitor).await?,
+            Err(error) => self.give_up(&job, error).await?,
+        }
+        Ok(Ran::Job(job.id))
+    }
+
+    async fn attempt(&self, job: &Job, monitor: &Monitor) -> Result<Assessment, AttemptError> {
+        let recording = self.queue.store().recording_to_assess(job.recording_id).await?;
+        let reader = self.queue.store().blobs().reader(&recording.blob).await?;
+        let (assess, settings, view) = (self.assess.clone(), job.settings.clone(), monitor.clone());
+        let sha256 = recording.blob.sha256.clone();
+        let computing = spawn_blocking(move || assess(reader, &recording, &settings, &view));
+        let mut assessment = self.watch(job, monitor, computing).await?;
+        assessment.provenance.recording_sha256 = sha256;
+        Ok(assessment)
+    }
+
+    /// Waits for the computation, renews the lease, and passes on the request to stop.
+    async fn watch(
+        &self,
+        job: &Job,
+        monitor: &Monitor,
+        mut computing: JoinHandle<Result<Assessment, AttemptError>>,
+    ) -> Result<Assessment, AttemptError> {
+        let mut heartbeat = tokio::time::interval(self.heartbeat);
+        heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        heartbeat.reset();
+        loop {
+            tokio::select! {
+                result = &mut computing => return result.unwrap_or_else(|panic| {
+                    tracing::error!(job = %job.id, attempt = job.attempt, %panic, "the computation panicked");
+                    Err(AttemptError::panicked())
+                }),
+                _ = heartbeat.tick() => match self.queue.renew(job.id, job.attempt, monitor.progress()).await {
+                    Ok(Renewal::Held) => {}
+                    Ok(Renewal::Lost | Renewal::CancelRequested) => monitor.cancel(),
+                    // The lease outlives a few silent heartbeats; if it does run out, the fence keeps order.
+                    Err(error) => tracing::warn!(job = %job.id, %error, "a lease could not be renewed"),
+                },
+                () = self.shutdown.cancelled(), if monitor.check().is_ok() => monitor.cancel(),
+            }
+        }
+    }
+
+    async fn save(&self, job: &Job, assessment: Assessment, monitor: &Monitor) -> Result<(), StorageError> {
+        // A request to stop that comes now is too late: the result is there.
+        let _ = monitor.begin(Step::Saving, 1);
+        match self.queue.finish(job.id, job.attempt, assessment).await {
+            Ok(Finish::Saved(assessment)) => {
+                tracing::info!(job = %job.id, attempt = job.attempt, %assessment, "job done");
+                Ok(())
+            }
+            Ok(Finish::Lost) => {
+                tracing::warn!(job = %job.id, attempt = job.attempt, "a result came after its lease, and was left");
+                Ok(())
+            }
+            Err(error) => self.give_up(job, error.into()).await,
+        }
+    }
+
+    async fn give_up(&self, job: &Job, error: AttemptError) -> Result<(), StorageError> {
+        let (id, attempt) = (job.id, job.attempt);
+        let (error, retryable) = match error {
+            AttemptError::Cancelled if self.shutdown.is_cancelled() => {
+                tracing::info!(job = %id, attempt, "job goes back to the queue: shutting down");
+                return self.queue.release(id, attempt).await;
+            }
+            AttemptError::Cancelled => {
+                let ended = self.queue.end_cancelled(id, attempt).await?;
+                tracing::info!(job = %id, attempt, ended, "job stopped on request");
+                return Ok(());
+            }
+            AttemptError::Refused(error) => (error, false),
+            AttemptError::Failed(error) => (error, true),
+        };
+        let outcome = self.queue.fail(id, attempt, &error, retryable).await?;
+        log_failure(id, attempt, &error, outcome);
+        Ok(())
+    }
+}
+
+fn log_failure(id: JobId, attempt: u32, error: &JobError, outcome: Failure) {
+    let JobError { code, place, sentence } = error;
+    match outcome {
+        Failure::WillRetry => tracing::warn!(job = %id, attempt, code, ?place, sentence, "attempt failed, will retry"),
+        Failure::GivenUp => tracing::warn!(job = %id, attempt, code, ?place, sentence, "job failed"),
+        Failure::Cancelled => tracing::info!(job = %id, attempt, code, "attempt failed; the job was to be stopped"),
+        Failure::Lost => tracing::warn!(job = %id, attempt, code, "attempt failed after its lease"),
+    }
+}
