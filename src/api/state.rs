@@ -3,6 +3,7 @@
 use super::metrics;
 use crate::config::Config;
 use crate::queue::Queue;
+use crate::recording::decode::Limits;
 use crate::storage::Store;
 use metrics_exporter_prometheus::{BuildError, PrometheusHandle};
 use std::sync::Arc;
@@ -22,6 +23,8 @@ pub struct AppState {
     pub queue: Queue,
     /// What the operator set.
     pub config: Arc<Config>,
+    /// How much of a recording is accepted.
+    pub limits: Limits,
     /// One permit for each JSON recording in memory.
     pub json_uploads: Arc<Semaphore>,
     /// The numbers for the operator.
@@ -35,11 +38,12 @@ impl AppState {
     ///
     /// # Errors
     /// When the process has another metrics recorder already.
-    pub fn new(store: Store, queue: Queue, config: Config) -> Result<Self, BuildError> {
+    pub fn new(queue: Queue, config: Config, limits: Limits) -> Result<Self, BuildError> {
         Ok(Self {
-            store,
+            store: queue.store().clone(),
             queue,
             config: Arc::new(config),
+            limits,
             json_uploads: Arc::new(Semaphore::new(JSON_UPLOADS_AT_ONCE)),
             metrics: metrics::recorder()?,
             shutdown: CancellationToken::new(),

@@ -3,7 +3,9 @@
 use crate::api::{self, AppState};
 use crate::config::Config;
 use crate::queue::{Queue, QueueSettings};
+use crate::recording::decode::Limits;
 use crate::storage::Store;
+use crate::worker;
 use anyhow::Context;
 use std::collections::HashMap;
 use std::net::SocketAddr;
@@ -146,10 +148,12 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
     let listener =
         TcpListener::bind(config.listen).await.with_context(|| format!("cannot listen on {}", config.listen))?;
     let addr = listener.local_addr()?;
-    let state = AppState::new(store.clone(), queue.clone(), config.clone())?;
+    let limits = recording_limits(&config);
+    let n_workers = config.workers;
+    let state = AppState::new(queue.clone(), config, limits.clone())?;
     let stop = state.shutdown.clone();
 
-    let mut workers = JoinSet::new();
+    let mut workers = worker::spawn(&queue, n_workers, &limits, &stop);
     let metrics = state.metrics.clone();
     let upkeep = stop.clone();
     workers.spawn(async move {
@@ -162,6 +166,12 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
     let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let server = tokio::spawn(serving.into_future());
     Ok(Running { addr, admin_key, store, stop, server, workers })
+}
+
+/// How much of a recording is accepted.
+pub fn recording_limits(config: &Config) -> Limits {
+    let max_json_bytes = usize::try_from(config.max_json_recording_bytes).unwrap_or(usize::MAX);
+    Limits { max_json_bytes, ..Limits::default() }
 }
 
 /// Runs the service until it is told to end.

@@ -8,7 +8,7 @@ use crate::api::error::ApiError;
 use crate::api::metrics::UPLOAD_BYTES;
 use crate::api::state::AppState;
 use crate::recording::DecodeError;
-use crate::recording::decode::{Format, Inspection, Inspector, Limits};
+use crate::recording::decode::{Format, Inspection, Inspector};
 use crate::storage::SealedBlob;
 use axum::body::{Body, BodyDataStream};
 use bytes::Bytes;
@@ -61,11 +61,7 @@ async fn receive_chunks(state: &AppState, announced: &Announced, chunks: &mut Ch
     chunks.limit = limit(state, Some(format));
     let _permit = permit(state, format).await?;
 
-    let limits = Limits {
-        max_json_bytes: usize::try_from(state.config.max_json_recording_bytes).unwrap_or(usize::MAX),
-        ..Limits::default()
-    };
-    let mut inspection = InspectionUnderWay::new(Inspector::new(format, &limits));
+    let mut inspection = InspectionUnderWay::new(Inspector::new(format, &state.limits));
     let mut blob = state.store.blobs().writer().await?;
     let mut next = Some(Bytes::from(first));
     while let Some(chunk) = next {
