@@ -142,7 +142,9 @@ pub struct PatientsQuery {
 /// Make a patient known
 #[utoipa::path(post, path = "/v1/patients", tag = "patients", operation_id = "create_patient",
     request_body = PatientRequest,
-    responses((status = 201, description = "Made; Location says where it lives", body = PatientResponse)))]
+    responses((status = 201, description = "Made; Location says where it lives", body = PatientResponse),
+              (status = 409, description = "The pseudonym is taken", body = super::error::Problem,
+               content_type = "application/problem+json")))]
 async fn create_patient(
     State(state): State<AppState>,
     Clinician(caller): Clinician,
@@ -192,7 +194,9 @@ async fn read_patient(
 /// Fields that are absent stay; null clears a field.
 #[utoipa::path(patch, path = "/v1/patients/{id}", tag = "patients", operation_id = "update_patient",
     params(PatientPath), request_body = PatientPatch,
-    responses((status = 200, description = "The patient as it is after the change", body = PatientResponse)))]
+    responses((status = 200, description = "The patient as it is after the change", body = PatientResponse),
+              (status = 409, description = "The pseudonym is taken", body = super::error::Problem,
+               content_type = "application/problem+json")))]
 async fn update_patient(
     State(state): State<AppState>,
     Clinician(caller): Clinician,

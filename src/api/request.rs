@@ -104,6 +104,11 @@ async fn read_body(headers: HeaderMap, body: Body, limit: usize) -> Result<Vec<u
 }
 
 fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
+    // Every body here is an object. The derived parsers would also take its values as an array, without their names.
+    let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+    if first == Some(&b'[') {
+        return Err(ApiError::InvalidBody(vec![FieldError::new("", "the body must be a JSON object, not an array")]));
+    }
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let path = error.path().to_string();
@@ -147,7 +152,12 @@ mod tests {
     fn an_unknown_field_a_tail_and_a_deep_nest_are_refused() {
         assert!(matches!(parse_json::<Body>(br#"{"inner": [], "more": 1}"#), Err(ApiError::InvalidBody(_))));
         assert!(matches!(parse_json::<Body>(br#"{"inner": []} 1"#), Err(ApiError::MalformedJson(_))));
-        let nest = "[".repeat(100_000);
+        let nest = format!("{{\"inner\": {}", "[".repeat(100_000));
         assert!(matches!(parse_json::<serde_json::Value>(nest.as_bytes()), Err(ApiError::MalformedJson(_))));
+    }
+
+    #[test]
+    fn values_without_names_are_not_taken_for_an_object() {
+        assert!(matches!(parse_json::<Body>(b" [[1, 2]]"), Err(ApiError::InvalidBody(_))));
     }
 }
