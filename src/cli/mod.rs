@@ -1,5 +1,6 @@
 //! The commands of the binary: one file per command.
 
+pub mod import;
 pub mod key;
 pub mod openapi;
 pub mod serve;
@@ -17,6 +18,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Serve(serve::Args),
+    Import(import::Args),
     Key(key::Args),
     Openapi(openapi::Args),
 }
@@ -29,6 +31,7 @@ pub fn run() -> anyhow::Result<()> {
     let runtime = tokio::runtime::Runtime::new()?;
     match Cli::parse().command {
         Command::Serve(args) => runtime.block_on(serve::run(&args)),
+        Command::Import(args) => import::run(&args),
         Command::Key(args) => runtime.block_on(key::run(&args)),
         Command::Openapi(args) => openapi::run(&args),
     }

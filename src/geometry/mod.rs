@@ -5,3 +5,4 @@
 
 pub mod attitude;
 pub mod euler;
+pub mod three_point;

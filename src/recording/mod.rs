@@ -7,6 +7,7 @@ pub mod coordinates;
 pub mod decode;
 pub mod encode;
 pub mod error;
+pub mod import;
 pub mod skeleton;
 
 pub use decode::{Format, Inspection, Inspector, Limits, decode};

@@ -135,3 +135,6 @@ impl Store {
         &self.readers
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -184,12 +184,12 @@ impl Store {
         let rows = sqlx::query(
             "SELECT * FROM patients
              WHERE organisation_id = ?1
-               AND (?2 IS NULL OR id < ?2)
+               AND id < ?2
                AND (?3 IS NULL OR substr(pseudonym, 1, length(?3)) = ?3)
              ORDER BY id DESC LIMIT ?4",
         )
         .bind(access.organisation)
-        .bind(page.after)
+        .bind(page.cursor())
         .bind(&filter.pseudonym_prefix)
         .bind(page.rows())
         .fetch_all(self.reader())

@@ -23,8 +23,9 @@ async fn ten_thousand_jobs_are_each_claimed_once_by_many_workers_of_two_processe
     // Nine thousand and more copies of the job, in one go.
     sqlx::query(
         "WITH RECURSIVE copies (n) AS (SELECT 2 UNION ALL SELECT n + 1 FROM copies WHERE n < ?1)
-         INSERT INTO jobs (id, recording_id, state, max_attempts, due_at, settings, queued_at)
-         SELECT randomblob(16), recording_id, state, max_attempts, due_at, settings, queued_at FROM jobs, copies",
+         INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at)
+         SELECT randomblob(16), organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at
+         FROM jobs, copies",
     )
     .bind(JOBS as i64)
     .execute(&side_door(bench.dir.path()).await)
@@ -74,13 +75,7 @@ async fn a_recording_and_its_job_are_stored_together_or_not_at_all() {
         .execute(&rows)
         .await
         .unwrap();
-    let mut writer = bench.queue.store().blobs().writer().await.unwrap();
-    writer.write("abc".into()).await.unwrap();
-    let new = surefoot::storage::NewRecording {
-        session_id: bench.session,
-        blob: writer.seal().await.unwrap().keep().await.unwrap(),
-        inspection: crate::support::inspection(),
-    };
+    let new = bench.new_recording(b"abc").await;
     let failed = bench.queue.submit(&bench.access, &new, &Default::default()).await;
     assert!(matches!(failed, Err(StorageError::Database(_))), "{failed:?}");
     let recordings: i64 = sqlx::query_scalar("SELECT count(*) FROM recordings").fetch_one(&rows).await.unwrap();

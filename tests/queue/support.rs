@@ -55,12 +55,16 @@ impl Bench {
 
     /// Stores a recording of these bytes and its job.
     pub async fn submit(&self, bytes: &'static [u8]) -> Job {
-        let new = NewRecording {
-            session_id: self.session,
-            blob: stored(self.queue.store(), bytes).await,
-            inspection: inspection(),
-        };
+        let new = self.new_recording(bytes).await;
         self.queue.submit(&self.access, &new, &Settings::default()).await.unwrap().1
+    }
+
+    /// A recording of these bytes, to be submitted.
+    pub async fn new_recording(&self, bytes: &'static [u8]) -> NewRecording {
+        let mut writer = self.queue.store().blobs().writer().await.unwrap();
+        writer.write(bytes.into()).await.unwrap();
+        let blob = writer.seal().await.unwrap().keep().await.unwrap();
+        NewRecording { session_id: self.session, blob, inspection: inspection() }
     }
 
     pub async fn enqueue(&self, recording: RecordingId) -> Job {
@@ -100,13 +104,7 @@ pub async fn open(dir: &Path, clock: &ManualClock) -> Queue {
     Queue::new(store, QueueSettings::default())
 }
 
-async fn stored(store: &Store, bytes: &'static [u8]) -> surefoot::storage::StoredBlob {
-    let mut writer = store.blobs().writer().await.unwrap();
-    writer.write(bytes.into()).await.unwrap();
-    writer.seal().await.unwrap().keep().await.unwrap()
-}
-
-pub fn inspection() -> Inspection {
+fn inspection() -> Inspection {
     Inspection {
         format: Format::Mcap,
         header: Header::default(),

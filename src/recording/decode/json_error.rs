@@ -11,19 +11,23 @@ pub(super) fn defect_in_json(text: &[u8], error: &serde_json::Error, root: &str)
     // The parser's own words end with the place, which is given apart.
     let full = error.to_string();
     let words = full.rsplit_once(" at line ").map_or(full.as_str(), |(words, _)| words);
+    // A number that is cut after its sign or its point is called invalid, not unfinished.
+    let is_cut = error.is_eof() || (words.contains("invalid number") && offset == text.len());
     let defect = match error.classify() {
-        Category::Eof => DecodeError::new(
+        _ if is_cut => DecodeError::new(
             "truncated",
             format!("the JSON text ends in the middle ({words}); send the whole recording again"),
         ),
-        Category::Syntax | Category::Io if is_not_finite(text, offset) || words.contains("number out of range") => {
+        Category::Syntax | Category::Io | Category::Eof
+            if is_not_finite(text, offset) || words.contains("number out of range") =>
+        {
             DecodeError::new(
                 "not_finite",
                 "found a number that is not finite (NaN, Infinity or beyond a 64-bit float); every number must be \
                  finite, a lost joint is written as null",
             )
         }
-        Category::Syntax | Category::Io => {
+        Category::Syntax | Category::Io | Category::Eof => {
             DecodeError::new("invalid_json", format!("this is not valid JSON: {words}; write it with a JSON library"))
         }
         Category::Data if words.starts_with("missing field") => {

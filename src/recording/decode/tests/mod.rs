@@ -1,0 +1,101 @@
+//! Tests of the decoders, by subject.
+
+mod damage;
+mod json;
+mod mcap_file;
+mod round_trip;
+
+use super::*;
+use crate::recording::encode;
+use crate::recording::{ReferenceSeries, SkeletonRecording};
+use nalgebra::Vector3;
+
+/// A small recording: three joints, five frames, one lost joint, one reference series.
+fn example() -> Recording {
+    let joints = vec![Joint::RightHip, Joint::RightKnee, Joint::RightAnkle];
+    let n = 5;
+    let positions = (0..n * 3).map(|i| Vector3::new(0.1, 1.0 - 0.4 * (i % 3) as f64, -2.0 + 0.01 * i as f64));
+    let mut skeleton = SkeletonRecording {
+        joints,
+        time_ns: (0..n as i64).map(|t| t * 33_333_333).collect(),
+        positions: positions.collect(),
+        confidence: vec![1.0; n * 3],
+        orientations: Vec::new(),
+    };
+    skeleton.positions[7] = Vector3::repeat(f64::NAN);
+    skeleton.confidence[7] = 0.0;
+    Recording {
+        header: Header { protocol: Some("squat".into()), subject_height_m: Some(1.75), ..Header::default() },
+        skeleton: Some(skeleton),
+        references: vec![ReferenceSeries {
+            channel: "right_knee_flexion_deg".into(),
+            source: "goniometer".into(),
+            clock_offset_ns: -5,
+            time_ns: vec![0, 10, 25],
+            values: vec![1.5, f64::NAN, -2.0],
+        }],
+    }
+}
+
+/// Every number to the last bit, NaN equal to NaN.
+fn bits(recording: &Recording) -> String {
+    format!("{recording:?}")
+}
+
+/// The answer of an inspector that gets the bytes in pieces; it must be the answer of `decode`.
+fn inspect(bytes: &[u8], format: Format, piece: usize) -> Result<Inspection, DecodeError> {
+    let mut inspector = Inspector::new(format, &Limits::default());
+    for part in bytes.chunks(piece) {
+        if let Err(defect) = inspector.push(part) {
+            assert_eq!(inspector.push(b"more"), Err(defect.clone()), "a defect stays");
+            return Err(defect);
+        }
+    }
+    inspector.finish()
+}
+
+/// The defect of both readers, which must agree.
+fn defect(bytes: &[u8], format: Format) -> DecodeError {
+    let defect = decode(bytes, format, &Limits::default()).map(|r| bits(&r)).expect_err("a defect");
+    assert_eq!(inspect(bytes, format, 64 * 1024).expect_err("a defect"), defect);
+    defect
+}
+
+#[test]
+fn an_inspector_tells_what_the_recording_holds() {
+    let recording = example();
+    for (format, bytes) in [
+        (Format::Mcap, encode::mcap(&recording).expect("mcap")),
+        (Format::Json, encode::json(&recording).expect("json")),
+    ] {
+        assert_eq!(Format::sniff(&bytes[..8]), Some(format));
+        for piece in [1, 7, 64 * 1024] {
+            let inspection = inspect(&bytes, format, piece).expect("a sound recording");
+            assert_eq!((inspection.n_frames, inspection.format), (5, format));
+            assert!((inspection.duration_s - 0.133_333_332).abs() < 1e-12);
+            assert_eq!(inspection.joints, [Joint::RightHip, Joint::RightKnee, Joint::RightAnkle]);
+            assert_eq!(inspection.reference_channels, ["right_knee_flexion_deg"]);
+            assert_eq!(inspection.header, recording.header);
+            assert!(!inspection.has_orientations && inspection.ignored_channels.is_empty());
+        }
+    }
+}
+
+#[test]
+fn an_inspector_keeps_no_frame() {
+    let mut decoder = Decoder::new(Format::Json, &Limits::default(), false);
+    decoder.push(&encode::json(&example()).expect("json")).expect("sound");
+    assert!(decoder.finish().expect("sound").recording.is_none());
+}
+
+#[test]
+fn a_reader_that_fails_is_not_a_defect_of_the_recording() {
+    struct Broken;
+    impl std::io::Read for Broken {
+        fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+            Err(std::io::Error::other("disk on fire"))
+        }
+    }
+    let error = decode(Broken, Format::Mcap, &Limits::default()).map(|r| bits(&r)).expect_err("unreadable");
+    assert_eq!(error.code, "unreadable");
+}

@@ -1,0 +1,92 @@
+//! Rows of numbers in text files, plain or gzip-ed.
+
+use super::ImportError;
+use flate2::read::MultiGzDecoder;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Largest text that is read, bytes after decompression: a hundred times the largest of the data sets.
+const MAX_TEXT_BYTES: u64 = 256 << 20;
+
+/// The text of a file whose name may or may not end in `.gz`; decompressed by what its bytes say.
+pub(super) fn text_of(file: &Path) -> Result<String, ImportError> {
+    let unreadable = |error| ImportError::Unreadable { file: file.to_owned(), error };
+    let mut bytes = Vec::new();
+    File::open(file).map_err(unreadable)?.take(MAX_TEXT_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
+    text_of_bytes(&bytes).map_err(unreadable)
+}
+
+/// The text in `bytes`, decompressed when they begin like gzip.
+pub(super) fn text_of_bytes(bytes: &[u8]) -> std::io::Result<String> {
+    let mut text = String::new();
+    if bytes.starts_with(&[0x1f, 0x8b]) {
+        MultiGzDecoder::new(bytes).take(MAX_TEXT_BYTES).read_to_string(&mut text)?;
+    } else {
+        text = String::from_utf8(bytes.to_vec()).map_err(|error| std::io::Error::other(error.to_string()))?;
+    }
+    Ok(text)
+}
+
+/// The file with this name, or with `.gz` after it.
+pub(super) fn existing(folder: &Path, name: &str) -> Option<PathBuf> {
+    [folder.join(name), folder.join(format!("{name}.gz"))].into_iter().find(|file| file.is_file())
+}
+
+/// Numbers of a text, row by row, every row of the same width.
+#[derive(Debug)]
+pub(super) struct Table {
+    n_columns: usize,
+    values: Vec<f64>,
+}
+
+impl Table {
+    /// Reads rows of exactly `n_columns` finite numbers that stand between commas or blanks; empty rows and the first
+    /// `n_header` rows are passed over. `file` is only named in errors.
+    pub(super) fn parse(text: &str, n_header: usize, n_columns: usize, file: &Path) -> Result<Self, ImportError> {
+        let mut values = Vec::new();
+        for (i, row) in text.lines().enumerate().skip(n_header) {
+            if row.trim().is_empty() {
+                continue;
+            }
+            let malformed = |reason| ImportError::Malformed { file: file.to_owned(), row: i + 1, reason };
+            let start = values.len();
+            for cell in row.split(|c: char| c == ',' || c.is_whitespace()).filter(|cell| !cell.is_empty()) {
+                match cell.parse::<f64>() {
+                    Ok(value) if value.is_finite() => values.push(value),
+                    _ => {
+                        let shown: String = cell.chars().take(32).collect();
+                        return Err(malformed(format!("`{shown}` is not a finite number")));
+                    }
+                }
+            }
+            if values.len() - start != n_columns {
+                return Err(malformed(format!("{} numbers, expected {n_columns}", values.len() - start)));
+            }
+        }
+        Ok(Self { n_columns, values })
+    }
+
+    /// Reads a file; see [`Table::parse`].
+    pub(super) fn read(file: &Path, n_header: usize, n_columns: usize) -> Result<Self, ImportError> {
+        Self::parse(&text_of(file)?, n_header, n_columns, file)
+    }
+
+    pub(super) fn n_rows(&self) -> usize {
+        self.values.len() / self.n_columns
+    }
+
+    pub(super) fn row(&self, row: usize) -> &[f64] {
+        &self.values[row * self.n_columns..(row + 1) * self.n_columns]
+    }
+
+    pub(super) fn column(&self, column: usize) -> Vec<f64> {
+        self.values.iter().skip(column).step_by(self.n_columns).copied().collect()
+    }
+
+    /// Number of triples, from column 0 on, that are exactly 0, 0, 0.
+    pub(super) fn n_zero_triples(&self) -> u64 {
+        let zero = |triple: &&[f64]| triple.iter().all(|value| *value == 0.0);
+        (0..self.n_rows()).map(|t| self.row(t).chunks_exact(3).filter(zero).count() as u64).sum()
+    }
+}

@@ -1,0 +1,45 @@
+//! The Python example writes a recording that decodes, when Python with the `mcap` package is there.
+
+use std::process::Command;
+use surefoot::body::Joint;
+use surefoot::geometry::three_point::flexion_of_three_points;
+use surefoot::recording::{Format, Inspector, Limits, decode};
+use surefoot::signal::interpolation::interpolate;
+
+#[test]
+fn the_python_example_writes_a_recording_whose_knees_bend_as_its_reference_says() {
+    let has_mcap = Command::new("python3").args(["-c", "import mcap.writer, zstandard"]).output();
+    if !has_mcap.is_ok_and(|output| output.status.success()) {
+        println!("skipped: python3 with the package `mcap` is not there");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("squats.mcap");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/python/write_recording.py");
+    let output = Command::new("python3").arg(script).arg(&file).output().expect("python runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+
+    let bytes = std::fs::read(&file).expect("written");
+    let mut inspector = Inspector::new(Format::Mcap, &Limits::default());
+    inspector.push(&bytes).expect("sound");
+    let inspection = inspector.finish().expect("whole");
+    assert_eq!(inspection.header.protocol.as_deref(), Some("squat"));
+    assert_eq!(inspection.joints.len(), 16);
+
+    let recording = decode(&bytes[..], Format::Mcap, &Limits::default()).expect("decodes");
+    let skeleton = recording.skeleton.expect("a skeleton");
+    assert_eq!(skeleton.len(), 421);
+    let lost = skeleton.confidence.iter().filter(|confidence| **confidence == 0.0).count();
+    assert_eq!(lost, 8, "the left hand, every fiftieth frame from the 25th on");
+    let reference = &recording.references[1];
+    assert_eq!(reference.channel, "right_knee_flexion_deg");
+    let [hip, knee, foot] =
+        [Joint::RightHip, Joint::RightKnee, Joint::RightFoot].map(|j| skeleton.column(j).expect("j"));
+    for (t, &time_ns) in skeleton.time_ns.iter().enumerate() {
+        let frame = skeleton.frame(t);
+        let raw = flexion_of_three_points(&frame[hip], &frame[knee], &frame[foot]).to_degrees();
+        let truth = interpolate(&reference.time_ns, &reference.values, time_ns);
+        // Positions are rounded to 0.01 mm on segments of 0.4 m, angles are read between samples 10 ms apart.
+        assert!(truth.is_nan() || (raw - truth).abs() < 0.01, "frame {t}: {raw} and {truth}");
+    }
+}
