@@ -72,6 +72,24 @@ fn every_reference_leads_somewhere() {
 }
 
 #[test]
+fn every_link_leads_to_an_operation_and_comes_from_a_documented_answer() {
+    let document = document();
+    let operations = operations(&document);
+    let names: HashSet<&str> = operations.iter().filter_map(|(_, _, o)| o["operationId"].as_str()).collect();
+    let mut links = 0;
+    for (path, method, operation) in &operations {
+        for (status, response) in operation["responses"].as_object().expect("responses") {
+            for link in response["links"].as_object().into_iter().flat_map(|links| links.values()) {
+                links += 1;
+                assert!(names.contains(link["operationId"].as_str().expect("a name")), "{method} {path}: {link}");
+                assert!(response["description"].is_string(), "{method} {path} {status} is not documented");
+            }
+        }
+    }
+    assert!(links >= 20, "only {links} links found");
+}
+
+#[test]
 fn closed_objects_of_the_request_bodies_say_so() {
     let document = document();
     for name in ["PatientRequest", "PatientPatch", "SessionRequest", "ClientRequest"] {

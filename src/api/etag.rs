@@ -65,6 +65,18 @@ fn tagged(request: &HeaderMap, content_type: &'static str, body: Vec<u8>) -> Res
     tag.on(([(header::CONTENT_TYPE, content_type)], Body::from(body)).into_response())
 }
 
+/// Weakens the tag of a compressed answer: its bytes are others than those the strong tag stands for.
+pub async fn weaken_when_compressed(mut response: Response) -> Response {
+    if response.headers().contains_key(header::CONTENT_ENCODING)
+        && let Some(tag) = response.headers().get(header::ETAG).and_then(|tag| tag.to_str().ok())
+        && !tag.starts_with("W/")
+        && let Ok(weak) = HeaderValue::try_from(format!("W/{tag}"))
+    {
+        response.headers_mut().insert(header::ETAG, weak);
+    }
+    response
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

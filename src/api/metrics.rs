@@ -16,11 +16,14 @@ pub const REQUESTS: &str = "surefoot_http_requests_total";
 pub const LATENCY: &str = "surefoot_http_request_duration_seconds";
 /// Bytes of recordings that arrived.
 pub const UPLOAD_BYTES: &str = "surefoot_upload_bytes_total";
+/// Time from the request for a job to the beginning of an attempt, seconds; the worker records it.
+pub const JOB_WAIT: &str = "surefoot_job_wait_seconds";
 /// Jobs by state.
 pub const JOBS: &str = "surefoot_jobs";
 
 /// Upper bounds of the buckets of every time, seconds: from a small read to a long assessment.
-const TIME_BUCKETS: [f64; 14] = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0, 120.0];
+const TIME_BUCKETS: [f64; 14] =
+    [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0, 120.0];
 
 static INSTALLED: Mutex<Option<PrometheusHandle>> = Mutex::new(None);
 
@@ -38,6 +41,7 @@ pub fn recorder() -> Result<PrometheusHandle, BuildError> {
         .install_recorder()?;
     metrics::describe_counter!(REQUESTS, "Requests answered");
     metrics::describe_histogram!(LATENCY, metrics::Unit::Seconds, "Time to the first byte of the answer");
+    metrics::describe_histogram!(JOB_WAIT, metrics::Unit::Seconds, "Time from the request for a job to its beginning");
     metrics::describe_counter!(UPLOAD_BYTES, metrics::Unit::Bytes, "Bytes of recordings that arrived");
     metrics::describe_gauge!(JOBS, "Jobs by state");
     *installed = Some(handle.clone());

@@ -59,6 +59,7 @@ pub fn router(state: AppState) -> Router {
         .layer(CatchPanicLayer::custom(observe::problem_of_panic))
         .layer(middleware::from_fn(observe::observe))
         .layer(CompressionLayer::new().compress_when(compressible))
+        .layer(middleware::map_response(etag::weaken_when_compressed))
         .layer(SetSensitiveRequestHeadersLayer::new(SECRET_HEADERS))
         .with_state(state)
 }

@@ -108,6 +108,40 @@ fn count(method: &Method, route: &str, response: &Response, seconds: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use axum::routing::get;
+    use axum::{Router, middleware};
+    use std::time::Duration;
+    use tower::ServiceExt;
+    use tower_http::catch_panic::CatchPanicLayer;
+    use tower_http::timeout::TimeoutLayer;
+
+    async fn broken() {
+        panic!("index 7 of patients out of range");
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_an_internal_error_that_tells_nothing() {
+        let router = Router::new()
+            .route("/", get(broken))
+            .layer(CatchPanicLayer::custom(problem_of_panic))
+            .layer(middleware::from_fn(observe));
+        let response = router.oneshot(Request::new(Body::empty())).await.unwrap();
+        assert_eq!((response.status().as_u16(), &response.headers()[header::CONTENT_TYPE]), (500, PROBLEM_JSON));
+        let body = axum::body::to_bytes(response.into_body(), usize::MAX).await.unwrap();
+        let problem: Problem = serde_json::from_slice(&body).unwrap();
+        assert_eq!(problem.code, "internal_error");
+        assert!(problem.instance.is_some() && !problem.detail.contains("patients"), "{problem:?}");
+    }
+
+    #[tokio::test]
+    async fn an_answer_that_takes_too_long_is_a_problem_too() {
+        let router = Router::new()
+            .route("/", get(std::future::pending::<()>))
+            .layer(TimeoutLayer::with_status_code(axum::http::StatusCode::REQUEST_TIMEOUT, Duration::ZERO))
+            .layer(middleware::from_fn(observe));
+        let response = router.oneshot(Request::new(Body::empty())).await.unwrap();
+        assert_eq!((response.status().as_u16(), &response.headers()[header::CONTENT_TYPE]), (408, PROBLEM_JSON));
+    }
 
     #[test]
     fn a_request_id_that_could_forge_a_log_line_is_replaced() {

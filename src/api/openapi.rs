@@ -68,6 +68,9 @@ pub(super) fn complete(document: &OpenApi) -> Value {
             }
         }
     }
+    add_links(&mut document);
+    let upload = &mut document["paths"]["/v1/sessions/{id}/recordings"]["post"]["requestBody"]["content"];
+    upload["application/json"]["example"] = example_recording();
     let schemas = document["components"]["schemas"].clone();
     if let Some(settled) = document["components"]["schemas"].as_object_mut() {
         for schema in settled.values_mut() {
@@ -137,11 +140,70 @@ fn merge_tagged_variants(schema: &mut Value, schemas: &Value) {
 
 /// A field that may be absent has no default to be told of, least of all one that its own type does not allow.
 fn drop_null_defaults(schema: &mut Value) {
-    for property in schema.get_mut("properties").and_then(Value::as_object_mut).into_iter().flat_map(|p| p.values_mut()) {
+    for property in schema.get_mut("properties").and_then(Value::as_object_mut).into_iter().flat_map(|p| p.values_mut())
+    {
         if property.get("default").is_some_and(Value::is_null)
             && let Some(property) = property.as_object_mut()
         {
             property.remove("default");
         }
+    }
+}
+
+/// Where the ids of an answer lead: (operation, status, place of the id in the body, operations that take it as `id`).
+const LINKS: [(&str, &str, &str, &[&str]); 8] = [
+    ("create_patient", "201", "/id", &["read_patient", "update_patient"]),
+    ("create_session", "201", "/id", &["read_session", "list_recordings", "upload_recording"]),
+    ("create_client", "201", "/client/id", &["revoke_client"]),
+    ("upload_recording", "202", "/recording/id", &["read_recording", "read_recording_content", "create_job"]),
+    ("upload_recording", "202", "/job/id", &["read_job", "read_job_events", "cancel_job"]),
+    ("create_job", "202", "/id", &["read_job", "read_job_events", "cancel_job"]),
+    ("read_job", "200", "/assessment_id", &["read_assessment", "read_series"]),
+    ("list_assessments", "200", "/items/0/id", &["read_assessment", "read_series"]),
+];
+
+/// Says where the ids of answers lead.
+fn add_links(document: &mut Value) {
+    let operations = document["paths"].as_object_mut().into_iter().flat_map(|paths| paths.values_mut());
+    for operation in operations.flat_map(|item| item.as_object_mut()).flat_map(|item| item.values_mut()) {
+        let name = operation["operationId"].as_str().unwrap_or_default().to_owned();
+        for (_, status, pointer, targets) in LINKS.iter().filter(|(from, ..)| *from == name) {
+            for target in *targets {
+                let id = format!("$response.body#{pointer}");
+                operation["responses"][status]["links"][target] =
+                    json!({"operationId": target, "parameters": {"id": id}});
+            }
+        }
+        if name == "create_patient" {
+            let body = json!({"patient_id": "$response.body#/id"});
+            operation["responses"]["201"]["links"]["create_session"] =
+                json!({"operationId": "create_session", "requestBody": body});
+        }
+    }
+}
+
+/// The shortest sound recording.
+fn example_recording() -> Value {
+    let frame = |time_ns: u64, y: f64| json!({"time_ns": time_ns, "positions": [[0.1, y, 2.0], [0.1, y - 0.4, 2.0]], "confidence": [1.0, 1.0]});
+    json!({
+        "format": "surefoot",
+        "version": 1,
+        "coordinates": {"handedness": "right", "up": "+y", "length_unit": "m"},
+        "header": {"protocol": "standing"},
+        "joints": ["left_hip", "left_knee"],
+        "frames": [frame(0, 0.0), frame(33_333_333, 0.002)],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::decode::{Format, Limits, decode};
+
+    #[test]
+    fn the_example_of_an_upload_is_a_recording() {
+        let bytes = example_recording().to_string();
+        let recording = decode(bytes.as_bytes(), Format::Json, &Limits::default()).unwrap();
+        assert_eq!(recording.skeleton.unwrap().len(), 2);
     }
 }

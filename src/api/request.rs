@@ -9,6 +9,7 @@ use axum::http::{HeaderMap, header};
 use futures::StreamExt;
 use garde::Validate;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 /// Largest JSON body of an ordinary request, bytes. Recordings have their own, configured limits.
 pub const MAX_JSON_BYTES: usize = 64 << 10;
@@ -104,24 +105,34 @@ async fn read_body(headers: HeaderMap, body: Body, limit: usize) -> Result<Vec<u
 }
 
 fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
+    let mut document: Value =
+        serde_json::from_slice(bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
     // Every body here is an object. The derived parsers would also take its values as an array, without their names.
-    let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
-    if first == Some(&b'[') {
-        return Err(ApiError::InvalidBody(vec![FieldError::new("", "the body must be a JSON object, not an array")]));
+    if !document.is_object() {
+        return Err(ApiError::InvalidBody(vec![FieldError::new("", "the body must be a JSON object")]));
     }
-    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+    make_whole_numbers_integers(&mut document);
+    serde_path_to_error::deserialize(document).map_err(|error| {
         let path = error.path().to_string();
-        let inner = error.into_inner();
-        if inner.is_data() {
-            let path = if path == "." { String::new() } else { path };
-            ApiError::InvalidBody(vec![FieldError::new(path, inner.to_string())])
-        } else {
-            ApiError::MalformedJson(inner.to_string())
+        let path = if path == "." { String::new() } else { path };
+        ApiError::InvalidBody(vec![FieldError::new(path, error.into_inner().to_string())])
+    })
+}
+
+/// To JSON, `1948.0` is the integer 1948, and some languages write it so; the derived parsers would refuse it.
+fn make_whole_numbers_integers(value: &mut Value) {
+    /// Integers up to here are exact in a float: 2^53.
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            if let Some(float) = number.as_f64().filter(|float| float.fract() == 0.0 && float.abs() <= EXACT) {
+                *value = Value::from(float as i64);
+            }
         }
-    })?;
-    deserializer.end().map_err(|error| ApiError::MalformedJson(error.to_string()))?;
-    Ok(value)
+        Value::Array(items) => items.iter_mut().for_each(make_whole_numbers_integers),
+        Value::Object(fields) => fields.values_mut().for_each(make_whole_numbers_integers),
+        _ => {}
+    }
 }
 
 fn field_errors(report: &garde::Report) -> Vec<FieldError> {
@@ -136,7 +147,6 @@ mod tests {
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]
     struct Body {
-        #[expect(dead_code, reason = "only its parsing is looked at")]
         inner: Vec<u8>,
     }
 
@@ -153,7 +163,13 @@ mod tests {
         assert!(matches!(parse_json::<Body>(br#"{"inner": [], "more": 1}"#), Err(ApiError::InvalidBody(_))));
         assert!(matches!(parse_json::<Body>(br#"{"inner": []} 1"#), Err(ApiError::MalformedJson(_))));
         let nest = format!("{{\"inner\": {}", "[".repeat(100_000));
-        assert!(matches!(parse_json::<serde_json::Value>(nest.as_bytes()), Err(ApiError::MalformedJson(_))));
+        assert!(matches!(parse_json::<Body>(nest.as_bytes()), Err(ApiError::MalformedJson(_))));
+    }
+
+    #[test]
+    fn a_whole_number_with_a_point_is_an_integer() {
+        assert_eq!(parse_json::<Body>(br#"{"inner": [1.0, 2e1, -0.0]}"#).unwrap().inner, [1, 20, 0]);
+        assert!(parse_json::<Body>(br#"{"inner": [1.5]}"#).is_err());
     }
 
     #[test]
