@@ -126,7 +126,8 @@ mod tests {
             .layer(CatchPanicLayer::custom(problem_of_panic))
             .layer(middleware::from_fn(observe));
         let response = router.oneshot(Request::new(Body::empty())).await.unwrap();
-        assert_eq!((response.status().as_u16(), &response.headers()[header::CONTENT_TYPE]), (500, PROBLEM_JSON));
+        assert_eq!(response.status().as_u16(), 500);
+        assert_eq!(response.headers()[header::CONTENT_TYPE], PROBLEM_JSON);
         let body = axum::body::to_bytes(response.into_body(), usize::MAX).await.unwrap();
         let problem: Problem = serde_json::from_slice(&body).unwrap();
         assert_eq!(problem.code, "internal_error");
@@ -140,7 +141,8 @@ mod tests {
             .layer(TimeoutLayer::with_status_code(axum::http::StatusCode::REQUEST_TIMEOUT, Duration::ZERO))
             .layer(middleware::from_fn(observe));
         let response = router.oneshot(Request::new(Body::empty())).await.unwrap();
-        assert_eq!((response.status().as_u16(), &response.headers()[header::CONTENT_TYPE]), (408, PROBLEM_JSON));
+        assert_eq!(response.status().as_u16(), 408);
+        assert_eq!(response.headers()[header::CONTENT_TYPE], PROBLEM_JSON);
     }
 
     #[test]

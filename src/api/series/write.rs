@@ -147,7 +147,7 @@ fn fixed(out: &mut Vec<u8>, scaled: u64, decimals: u32) {
         return;
     }
     let mut width = decimals as usize;
-    while fraction % 10 == 0 {
+    while fraction.is_multiple_of(10) {
         fraction /= 10;
         width -= 1;
     }
