@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{sentence}")]
 pub struct DecodeError {
-    /// Stable, documented code, for example `time_not_increasing`.
+    /// Stable code, one of [`DECODE_CODES`], for example `time_not_increasing`.
     pub code: &'static str,
     /// Where: a field path or a place in the stream, for example `frames[17].time_ns` or `byte 4096`.
     pub place: Option<String>,
@@ -15,6 +15,7 @@ pub struct DecodeError {
 impl DecodeError {
     /// A defect without a place.
     pub fn new(code: &'static str, sentence: impl Into<String>) -> Self {
+        debug_assert!(DECODE_CODES.contains(&code), "`{code}` is not a documented code");
         Self { code, place: None, sentence: sentence.into() }
     }
 
@@ -23,5 +24,55 @@ impl DecodeError {
     pub fn at(mut self, place: impl Into<String>) -> Self {
         self.place = Some(place.into());
         self
+    }
+}
+
+/// Every code of a [`DecodeError`], sorted; `docs/recording-format.md` says what each means.
+pub const DECODE_CODES: [&str; 33] = [
+    "bad_quaternion",
+    "checksum_mismatch",
+    "confidence_out_of_range",
+    "decompression_limit",
+    "duplicate_channel",
+    "duplicate_joint",
+    "empty_recording",
+    "invalid_json",
+    "invalid_mcap",
+    "invalid_value",
+    "joint_count_mismatch",
+    "missing_field",
+    "missing_header",
+    "not_a_recording",
+    "not_finite",
+    "position_out_of_range",
+    "record_too_large",
+    "time_not_increasing",
+    "too_few_frames",
+    "too_large",
+    "too_long",
+    "too_many_channels",
+    "too_many_frames",
+    "too_many_samples",
+    "truncated",
+    "unknown_field",
+    "unknown_joint",
+    "unknown_topic",
+    "unreadable",
+    "unsupported_compression",
+    "unsupported_encoding",
+    "unsupported_version",
+    "wrong_profile",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_on_the_format_lists_exactly_the_codes() {
+        let page = include_str!("../../docs/recording-format.md");
+        let table = page.split("## Codes").nth(1).expect("the section").split("\n## ").next().expect("its text");
+        let listed: Vec<&str> = table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+        assert_eq!(listed, DECODE_CODES);
     }
 }

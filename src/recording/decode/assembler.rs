@@ -1,28 +1,17 @@
 //! Values in, recording out: everything that both formats check, one frame at a time.
 
+use super::checks::{MAX_TEXT, check_counts, checked_sample};
 use super::limits::{Format, Limits};
-use super::message::{FrameMessage, List, Numbers};
+use super::message::{FrameMessage, List};
 use super::{IgnoredChannel, Inspection};
 use crate::body::Joint;
-use crate::recording::coordinates::{Coordinates, Handedness, Up};
+use crate::recording::coordinates::Coordinates;
 use crate::recording::{DecodeError, Header, Recording, ReferenceSeries, SkeletonRecording};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
-
-/// Farthest coordinate of a joint from the sensor, metres; nothing that sees bodies sees farther.
-const MAX_COORDINATE_M: f64 = 100.0;
-
-/// Accepted deviation of a quaternion's norm from one: numbers rounded to two decimals still pass.
-const QUATERNION_TOLERANCE: f64 = 0.01;
-
-/// Below this deviation a quaternion is kept bit for bit, so that a decoded recording encodes to the same bytes.
-const QUATERNION_EXACT: f64 = 1e-9;
 
 /// Accepted stature, metres.
 const STATURE_M: std::ops::RangeInclusive<f64> = 0.5..=2.5;
-
-/// Longest accepted free text of the header, characters.
-const MAX_TEXT: usize = 64;
 
 /// Result of a whole upload.
 pub(super) struct Assembled {
@@ -141,56 +130,28 @@ impl Assembler {
     /// Takes one skeleton frame.
     pub(super) fn frame(&mut self, time_ns: i64, frame: &FrameMessage) -> Result<(), DecodeError> {
         let index = self.n_frames;
-        let at = |field: &str| format!("frames[{index}].{field}");
-        self.check_time(time_ns).map_err(|defect| defect.at(at("time_ns")))?;
+        self.check_time(time_ns).map_err(|defect| defect.at(format!("frames[{index}].time_ns")))?;
         let (Some(joints), Some((_, coordinates))) = (&self.joints, &self.header) else {
             let sentence = "a skeleton frame came before the header and the joints were declared";
             return Err(DecodeError::new("missing_header", sentence).at(format!("frames[{index}]")));
         };
-        let n = joints.len();
-        check_count(frame.positions.count, joints, &at("positions"))?;
-        if let Some(confidence) = &frame.confidence {
-            check_count(confidence.count, joints, &at("confidence"))?;
-        }
-        if let Some(orientations) = &frame.orientations {
-            check_count(orientations.count, joints, &at("orientations"))?;
-        }
+        check_counts(frame, joints, index)?;
         if self.keep && frame.orientations.is_some() && self.skeleton.orientations.is_empty() {
             // Frames before the first one with orientations had none.
             self.skeleton.orientations.resize(self.skeleton.positions.len(), None);
         }
         let keeps_orientations = self.keep && (frame.orientations.is_some() || !self.skeleton.orientations.is_empty());
-        for j in 0..n {
-            let position = frame.positions.items[j];
-            let given = frame.confidence.as_ref().map(|list| list.items[j]);
-            let confidence = checked_confidence(given, &|| at(&format!("confidence[{j}]")))?;
-            if let Some(Numbers(p)) = position {
-                check_position(p, joints[j], &|| at(&format!("positions[{j}]")))?;
-            }
-            let raw = frame.orientations.as_ref().and_then(|list| list.items[j]);
-            let orientation = match raw {
-                Some(Numbers(q)) => checked_orientation(q, &|| at(&format!("orientations[{j}]")))?,
-                None => None,
-            };
-            // Lost is lost: whichever way the client says so, the joint keeps nothing.
-            let seen = position.filter(|_| confidence > 0.0);
-            self.has_orientations |= seen.is_some() && orientation.is_some();
+        for (j, &joint) in joints.iter().enumerate() {
+            let sample = checked_sample(frame, j, joint, index)?;
+            self.has_orientations |= sample.orientation.is_some();
             if !self.keep {
                 continue;
             }
-            match seen {
-                Some(Numbers(p)) => {
-                    self.skeleton.positions.push(coordinates.world_from_declared(Vector3::from(p)));
-                    self.skeleton.confidence.push(confidence);
-                }
-                None => {
-                    self.skeleton.positions.push(Vector3::repeat(f64::NAN));
-                    self.skeleton.confidence.push(0.0);
-                }
-            }
+            let position = sample.position.map_or(Vector3::repeat(f64::NAN), |p| coordinates.world_from_declared(p));
+            self.skeleton.positions.push(position);
+            self.skeleton.confidence.push(sample.confidence);
             if keeps_orientations {
-                let orientation = orientation.filter(|_| seen.is_some());
-                self.skeleton.orientations.push(orientation.map(|q| coordinates.world_from_joint(q)));
+                self.skeleton.orientations.push(sample.orientation.map(|q| coordinates.world_from_joint(q)));
             }
         }
         if self.keep {
@@ -365,82 +326,4 @@ impl Assembler {
         });
         Ok(Assembled { inspection, recording })
     }
-}
-
-/// The declared axes, or what is wrong with them.
-pub(super) fn coordinates_from_names(
-    handedness: &str,
-    up: &str,
-    length_unit: &str,
-    place: &str,
-) -> Result<Coordinates, DecodeError> {
-    let refuse = |field: &str, found: &str, expected: &str| {
-        let shown: String = found.chars().take(MAX_TEXT).collect();
-        let sentence = format!("`{field}` is `{shown}`, expected {expected}");
-        Err(DecodeError::new("invalid_value", sentence).at(format!("{place}.{field}")))
-    };
-    let Some(handedness) = Handedness::from_name(handedness) else {
-        return refuse("handedness", handedness, "`right` or `left`");
-    };
-    let Some(up) = Up::from_name(up) else {
-        return refuse("up", up, "one of `+x`, `-x`, `+y`, `-y`, `+z`, `-z`");
-    };
-    if length_unit != "m" {
-        return refuse("length_unit", length_unit, "`m`: convert the positions to metres");
-    }
-    Ok(Coordinates { handedness, up })
-}
-
-fn check_count(count: usize, joints: &[Joint], place: &str) -> Result<(), DecodeError> {
-    if count == joints.len() {
-        return Ok(());
-    }
-    let sentence = format!(
-        "found {count} entries for {} joints; write one entry for each joint, null for a lost one",
-        joints.len()
-    );
-    Err(DecodeError::new("joint_count_mismatch", sentence).at(place))
-}
-
-fn check_position(p: [f64; 3], joint: Joint, place: &dyn Fn() -> String) -> Result<(), DecodeError> {
-    if p.iter().all(|c| c.abs() <= MAX_COORDINATE_M) {
-        return Ok(());
-    }
-    let [x, y, z] = p;
-    let sentence = format!(
-        "joint `{joint}` is at ({x}, {y}, {z}); coordinates are metres and stay within {MAX_COORDINATE_M} of the sensor"
-    );
-    Err(DecodeError::new("position_out_of_range", sentence).at(place()))
-}
-
-fn checked_confidence(given: Option<f32>, place: &dyn Fn() -> String) -> Result<f32, DecodeError> {
-    match given {
-        None => Ok(1.0),
-        Some(c) if (0.0..=1.0).contains(&c) => Ok(c),
-        Some(c) => {
-            let sentence = format!("the confidence is {c}, expected 0 (lost) to 1");
-            Err(DecodeError::new("confidence_out_of_range", sentence).at(place()))
-        }
-    }
-}
-
-/// The rotation, or nothing for four zeros, which is how Kinect writes "none".
-fn checked_orientation(q: [f64; 4], place: &dyn Fn() -> String) -> Result<Option<UnitQuaternion<f64>>, DecodeError> {
-    if q == [0.0; 4] {
-        return Ok(None);
-    }
-    let quaternion = Quaternion::new(q[0], q[1], q[2], q[3]);
-    let deviation = (quaternion.norm() - 1.0).abs();
-    if deviation.is_nan() || deviation > QUATERNION_TOLERANCE {
-        let sentence = format!(
-            "the quaternion's norm is {}, expected 1 ± {QUATERNION_TOLERANCE}; write w, x, y, z, or null where there is none",
-            quaternion.norm()
-        );
-        return Err(DecodeError::new("bad_quaternion", sentence).at(place()));
-    }
-    Ok(Some(if deviation < QUATERNION_EXACT {
-        UnitQuaternion::new_unchecked(quaternion)
-    } else {
-        UnitQuaternion::new_normalize(quaternion)
-    }))
 }

@@ -3,7 +3,8 @@
 //! The first reading finds what the frames need (axes, joints), wherever in the document it stands, and proves the
 //! syntax; the second feeds the frames one by one to the assembler, so that no tree of values is ever built.
 
-use super::assembler::{Assembler, coordinates_from_names};
+use super::assembler::Assembler;
+use super::checks::coordinates_from_names;
 use super::json_error::defect_in_json;
 use super::limits::BYTE_ORDER_MARK;
 use super::message::{FrameMessage, Preamble, ReferenceMessage};

@@ -1,6 +1,7 @@
 //! An MCAP recording, read record by record as its bytes arrive.
 
-use super::assembler::{Assembler, coordinates_from_names};
+use super::assembler::Assembler;
+use super::checks::coordinates_from_names;
 use super::chunk;
 use super::json_error::defect_in_json;
 use super::limits::Limits;

@@ -5,6 +5,7 @@
 //! stored bytes and keeps the frames.
 
 mod assembler;
+mod checks;
 mod chunk;
 mod json;
 mod json_error;

@@ -3,29 +3,33 @@
 use super::ImportError;
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// Largest text that is read, bytes after decompression: a hundred times the largest of the data sets.
 const MAX_TEXT_BYTES: u64 = 256 << 20;
 
-/// The text of a file whose name may or may not end in `.gz`; decompressed by what its bytes say.
+/// The text of a file, decompressed when its bytes begin like gzip.
 pub(super) fn text_of(file: &Path) -> Result<String, ImportError> {
     let unreadable = |error| ImportError::Unreadable { file: file.to_owned(), error };
-    let mut bytes = Vec::new();
-    File::open(file).map_err(unreadable)?.take(MAX_TEXT_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
-    text_of_bytes(&bytes).map_err(unreadable)
+    let bytes = read_whole(File::open(file).map_err(unreadable)?).map_err(unreadable)?;
+    text_of_bytes(bytes).map_err(unreadable)
 }
 
 /// The text in `bytes`, decompressed when they begin like gzip.
-pub(super) fn text_of_bytes(bytes: &[u8]) -> std::io::Result<String> {
-    let mut text = String::new();
-    if bytes.starts_with(&[0x1f, 0x8b]) {
-        MultiGzDecoder::new(bytes).take(MAX_TEXT_BYTES).read_to_string(&mut text)?;
-    } else {
-        text = String::from_utf8(bytes.to_vec()).map_err(|error| std::io::Error::other(error.to_string()))?;
+pub(super) fn text_of_bytes(bytes: Vec<u8>) -> io::Result<String> {
+    let plain = if bytes.starts_with(&[0x1f, 0x8b]) { read_whole(MultiGzDecoder::new(&bytes[..]))? } else { bytes };
+    String::from_utf8(plain).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.utf8_error()))
+}
+
+/// Everything a reader holds; more than the limit is refused, not cut.
+fn read_whole(reader: impl Read) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let n = reader.take(MAX_TEXT_BYTES + 1).read_to_end(&mut bytes)?;
+    if n as u64 > MAX_TEXT_BYTES {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("more than {MAX_TEXT_BYTES} bytes of text")));
     }
-    Ok(text)
+    Ok(bytes)
 }
 
 /// The file with this name, or with `.gz` after it.

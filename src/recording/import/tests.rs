@@ -231,6 +231,22 @@ fn the_data_set_is_found_from_two_levels_above_and_not_elsewhere() {
 }
 
 #[test]
+fn a_gzip_file_that_is_cut_is_refused() {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(rows(50, 66).as_bytes()).expect("written");
+    let zipped = encoder.finish().expect("zipped");
+    assert_eq!(text_of_bytes(zipped.clone()).expect("sound"), rows(50, 66));
+    assert!(text_of_bytes(zipped[..zipped.len() - 9].to_vec()).is_err());
+}
+
+#[test]
+fn of_utdmhad_only_the_actions_with_the_sensor_on_the_thigh_are_listed() {
+    let folder = folder_with(&[("a01_s1_t1_skeleton.csv", b""), ("a22_s1_t1_skeleton.csv", b"")]);
+    let sources = list(Dataset::Utdmhad, folder.path()).expect("one");
+    assert_eq!(sources.iter().map(|source| source.name.as_str()).collect::<Vec<_>>(), ["a22_s1_t1"]);
+}
+
+#[test]
 fn a_malformed_row_is_an_error_that_names_the_file_and_the_row() {
     let file = Path::new("some/file.txt");
     let error = |text: &str| Table::parse(text, 0, 2, file).expect_err("malformed").to_string();
@@ -276,10 +292,10 @@ proptest! {
 
     #[test]
     fn any_bytes_in_any_file_are_refused_or_read_without_panic(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
-        let _ = text_of_bytes(&bytes);
+        let _ = text_of_bytes(bytes.clone());
         let mut zipped = vec![0x1f, 0x8b];
         zipped.extend(&bytes);
-        let _ = text_of_bytes(&zipped);
+        let _ = text_of_bytes(zipped);
         let folder = folder_with(&[
             ("segmented/kinect/positions/m01_s01_e01_positions.txt", &bytes),
             ("segmented/kinect/angles/m01_s01_e01_angles.txt", &bytes),
@@ -320,5 +336,36 @@ proptest! {
             ("segmented/kinect/angles/m01_s01_e01_angles.txt", text.as_bytes()),
         ]);
         prop_assert!(list(Dataset::Uiprmd, folder.path()).expect("a trial")[0].read().is_ok());
+    }
+}
+
+#[test]
+fn in_every_data_set_bent_knees_lie_forward_and_the_right_foot_to_the_right() {
+    let Some(data) = shared_data() else { return };
+    for dataset in Dataset::ALL {
+        let mut n_bent = 0;
+        for trial in all_trials(dataset, &data) {
+            let skeleton = skeleton(&trial);
+            let at = |t: usize, joint| skeleton.frame(t)[skeleton.column(joint).expect("joint")];
+            let right_at = |t| at(t, Joint::RightHip) - at(t, Joint::LeftHip);
+            let apart = (0..skeleton.len())
+                .map(|t| (at(t, Joint::RightAnkle) - at(t, Joint::LeftAnkle)).dot(&right_at(t)))
+                .filter(|dot| dot.is_finite());
+            assert!(median(apart.collect()) > 0.0, "{}: the right foot is on the left", trial.notes.name);
+            let raw = uiprmd::raw_knee_flexion_deg(skeleton, Side::Right);
+            let bent = (0..skeleton.len()).filter(|&t| raw[t] > 55.0);
+            let forward: Vec<f64> = bent
+                .map(|t| {
+                    let middle = (at(t, Joint::RightHip) + at(t, Joint::RightAnkle)) / 2.0;
+                    // Z to the subject's right, Y up: X = Y × Z points forward.
+                    nalgebra::Vector3::y().cross(&right_at(t)).dot(&(at(t, Joint::RightKnee) - middle))
+                })
+                .collect();
+            if forward.len() > 5 {
+                n_bent += 1;
+                assert!(median(forward) > 0.0, "{}: the right knee bends backwards", trial.notes.name);
+            }
+        }
+        assert!(n_bent > 0, "{}: no trial bends the right knee", dataset.name());
     }
 }

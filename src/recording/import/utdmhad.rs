@@ -1,4 +1,5 @@
-//! UTD-MHAD: Kinect v1, 20 joints, with one inertial sensor on the right thigh in the actions that are imported.
+//! UTD-MHAD: Kinect v1, 20 joints, with one inertial sensor: on the right thigh in the actions that are imported (a22 to
+//! a27), on the wrist in the others, which are passed over.
 //!
 //! The skeleton has no time stamps and not the 30 frames/s of its sensor; both streams are taken as starting and ending
 //! together, so the frame rate is frames / inertial duration (50 samples/s).
@@ -69,26 +70,27 @@ pub(super) fn list(root: &Path) -> Result<Vec<Source>, ImportError> {
     let mut sources = Vec::new();
     for file in file_names(root)? {
         let Some(stem) = super::without_gz(&file).strip_suffix("_skeleton.csv") else { continue };
+        let Some(exercise) = exercise(stem) else { continue };
         sources.push(Source {
             dataset: Dataset::Utdmhad,
             name: stem.to_owned(),
-            exercise: exercise(stem).to_owned(),
+            exercise: exercise.to_owned(),
             file: root.join(&file),
         });
     }
     Ok(sources)
 }
 
-fn exercise(stem: &str) -> &str {
-    match stem.split('_').next().unwrap_or(stem) {
+fn exercise(stem: &str) -> Option<&'static str> {
+    Some(match stem.split('_').next()? {
         "a22" => "a22_jog_in_place",
         "a23" => "a23_walk_in_place",
         "a24" => "a24_sit_to_stand",
         "a25" => "a25_stand_to_sit",
         "a26" => "a26_forward_lunge",
         "a27" => "a27_squat",
-        other => other,
-    }
+        _ => return None,
+    })
 }
 
 pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {

@@ -222,3 +222,24 @@ fn limits_on_frames_and_samples_hold() {
     assert_eq!(code(Limits { max_reference_samples: 2, ..Limits::default() }), "too_many_samples");
     assert_eq!(code(Limits { max_duration_s: 0, ..Limits::default() }), "too_long");
 }
+
+#[test]
+fn the_example_on_the_page_is_a_valid_recording() {
+    let page = include_str!("../../../../docs/recording-format.md");
+    let section = page.split("\n## JSON").nth(1).expect("the section");
+    let example = section.split("```json").nth(1).expect("the example").split("```").next().expect("its text");
+    let inspection = inspect(example.as_bytes(), Format::Json, 100).expect("valid");
+    assert_eq!((inspection.n_frames, inspection.joints.len()), (2, 2));
+    assert_eq!(inspection.header.device.model.as_deref(), Some("kinect-v2"));
+}
+
+#[test]
+fn the_page_names_every_joint() {
+    let page = include_str!("../../../../docs/recording-format.md");
+    let list = page.split("```text").nth(1).expect("the list").split("```").next().expect("its text");
+    let mut named: Vec<&str> = list.split_whitespace().collect();
+    let mut known: Vec<&str> = Joint::ALL.iter().map(|joint| joint.name()).collect();
+    named.sort_unstable();
+    known.sort_unstable();
+    assert_eq!(named, known);
+}
