@@ -1,6 +1,7 @@
 -- Conventions: ids are UUID v7 as 16-byte BLOB (they sort by time); wall-clock times are integer milliseconds since
 -- 1970 UTC and end in `_at`; times on a recording's own clock are integer nanoseconds and end in `_ns`; structured
--- values that are never searched are JSON in TEXT.
+-- values that are never searched are JSON in TEXT. Every row that a client can list carries its organisation, so that a
+-- page is read off one index, however many organisations there are.
 
 CREATE TABLE organisations (
     id BLOB NOT NULL PRIMARY KEY CHECK (length(id) = 16),
@@ -49,6 +50,7 @@ CREATE INDEX sessions_of_client ON sessions (created_by, id);
 
 CREATE TABLE recordings (
     id BLOB NOT NULL PRIMARY KEY CHECK (length(id) = 16),
+    organisation_id BLOB NOT NULL REFERENCES organisations (id),
     session_id BLOB NOT NULL REFERENCES sessions (id),
     created_by BLOB NOT NULL REFERENCES clients (id),
     size_bytes INTEGER NOT NULL CHECK (size_bytes >= 0),
@@ -57,12 +59,14 @@ CREATE TABLE recordings (
     inspection TEXT NOT NULL,
     created_at INTEGER NOT NULL
 ) STRICT;
+CREATE INDEX recordings_of_organisation ON recordings (organisation_id, id);
 CREATE INDEX recordings_of_session ON recordings (session_id, id);
 
 -- `due_at` is when a claim may take the job: the end of the back-off while it is queued, the end of the lease while it
 -- runs, null once it is over. One column and one index serve the claim, whatever the job waits for.
 CREATE TABLE jobs (
     id BLOB NOT NULL PRIMARY KEY CHECK (length(id) = 16),
+    organisation_id BLOB NOT NULL REFERENCES organisations (id),
     recording_id BLOB NOT NULL REFERENCES recordings (id),
     state TEXT NOT NULL CHECK (state IN ('queued', 'running', 'done', 'failed', 'cancelled')),
     attempt INTEGER NOT NULL DEFAULT 0 CHECK (attempt >= 0),
@@ -81,11 +85,12 @@ CREATE TABLE jobs (
 ) STRICT;
 CREATE INDEX jobs_due ON jobs (due_at, id) WHERE due_at IS NOT NULL;
 CREATE INDEX jobs_leased ON jobs (due_at) WHERE state = 'running';
+CREATE INDEX jobs_of_organisation ON jobs (organisation_id, id);
 CREATE INDEX jobs_of_recording ON jobs (recording_id, id);
-CREATE INDEX jobs_by_state ON jobs (state, id);
 
 CREATE TABLE assessments (
     id BLOB NOT NULL PRIMARY KEY CHECK (length(id) = 16),
+    organisation_id BLOB NOT NULL REFERENCES organisations (id),
     recording_id BLOB NOT NULL REFERENCES recordings (id),
     job_id BLOB NOT NULL UNIQUE REFERENCES jobs (id),
     pipeline TEXT NOT NULL,
@@ -99,6 +104,7 @@ CREATE TABLE assessments (
     end_time_ns INTEGER,
     created_at INTEGER NOT NULL
 ) STRICT;
+CREATE INDEX assessments_of_organisation ON assessments (organisation_id, id);
 CREATE INDEX assessments_of_recording ON assessments (recording_id, id);
 
 -- Sample times, in chunks of 4096: differences as zstd.

@@ -56,7 +56,8 @@ pub struct JointAngleSettings {
     /// Particles of the `paper` method, 16 to 65536; the paper compares 128, 512 and 2048.
     #[schema(minimum = 16, maximum = 65536)]
     pub particles: u32,
-    /// Seed of the random streams.
+    /// Seed of the random streams, at most 2^53 - 1, so that every JSON library reads the same number.
+    #[schema(maximum = 9_007_199_254_740_991_i64)]
     pub seed: u64,
     /// Joints in which the sensor's confidence is lower count as not seen, 0 to 1.
     #[schema(minimum = 0, maximum = 1)]

@@ -3,7 +3,6 @@
 use crate::recording::{Format, Recording, encode};
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 use anyhow::{Context, bail};
-use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -11,11 +10,11 @@ use std::path::{Path, PathBuf};
 ///
 /// The recording starts with two seconds in the T-posture; the truth comes along on its reference channels, so that
 /// `evaluate` or any MCAP reader can compare. The same arguments always give the same bytes.
-#[derive(Debug, Args)]
+#[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot simulate back_knee --out knee.mcap\n  \
     surefoot simulate step --noise kinect-v2 --jitter --seed 7 --out step.json\n  \
     surefoot simulate all --noise failures --out recordings/")]
-pub struct SimulateArgs {
+pub struct Args {
     /// back_knee, sit_front_knee, side_hip, step, near_tandem, or all for one file of each
     exercise: String,
     /// File to write, .mcap or .json; for `all` a directory, made when absent
@@ -49,7 +48,7 @@ pub struct SimulateArgs {
 ///
 /// # Errors
 /// Unknown exercise, setting out of range, or a file that cannot be written.
-pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
+pub fn run(args: &Args) -> anyhow::Result<()> {
     if args.exercise == "all" {
         fs::create_dir_all(&args.out).with_context(|| format!("cannot make the directory {}", args.out.display()))?;
         for exercise in Exercise::ALL {
@@ -60,7 +59,7 @@ pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     write(args, args.exercise.parse()?, &args.out)
 }
 
-fn write(args: &SimulateArgs, exercise: Exercise, path: &Path) -> anyhow::Result<()> {
+fn write(args: &Args, exercise: Exercise, path: &Path) -> anyhow::Result<()> {
     let format = format_of(path)?;
     let settings = SimulationSettings {
         exercise,
@@ -105,7 +104,7 @@ mod tests {
     #[derive(Parser)]
     struct Command {
         #[command(flatten)]
-        args: SimulateArgs,
+        args: Args,
     }
 
     fn simulate_to(path: &Path, words: &[&str]) -> anyhow::Result<()> {

@@ -55,10 +55,10 @@ impl Queue {
         let now = ms_from_time(self.store.now());
         let id = JobId::new();
         let inserted = sqlx::query(
-            "INSERT INTO jobs (id, recording_id, state, max_attempts, due_at, settings, queued_at)
-             SELECT ?1, r.id, 'queued', ?5, ?6, ?7, ?6
+            "INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at)
+             SELECT ?1, r.organisation_id, r.id, 'queued', ?5, ?6, ?7, ?6
              FROM recordings r JOIN sessions s ON s.id = r.session_id
-             WHERE s.organisation_id = ?2 AND (?3 IS NULL OR s.created_by = ?3) AND r.id = ?4",
+             WHERE r.organisation_id = ?2 AND (?3 IS NULL OR s.created_by = ?3) AND r.id = ?4",
         )
         .bind(id)
         .bind(access.organisation)

@@ -14,7 +14,7 @@ impl Queue {
             "SELECT j.*, r.session_id, a.id AS assessment_id
              FROM jobs j JOIN recordings r ON r.id = j.recording_id JOIN sessions s ON s.id = r.session_id
                   LEFT JOIN assessments a ON a.job_id = j.id
-             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND j.id = ?3",
+             WHERE j.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND j.id = ?3",
         )
         .bind(access.organisation)
         .bind(access.only_sessions_of())
@@ -35,24 +35,35 @@ impl Queue {
         filter: &JobFilter,
         page: &PageRequest<JobId>,
     ) -> Result<Page<Job, JobId>, StorageError> {
-        let rows = sqlx::query(
-            "SELECT j.*, r.session_id, a.id AS assessment_id
-             FROM jobs j JOIN recordings r ON r.id = j.recording_id JOIN sessions s ON s.id = r.session_id
-                  LEFT JOIN assessments a ON a.job_id = j.id
-             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
-               AND (?3 IS NULL OR j.id < ?3)
-               AND (?4 IS NULL OR j.state = ?4)
-               AND (?5 IS NULL OR j.recording_id = ?5)
-             ORDER BY j.id DESC LIMIT ?6",
-        )
-        .bind(access.organisation)
-        .bind(access.only_sessions_of())
-        .bind(page.after)
-        .bind(filter.state.map(JobState::name))
-        .bind(filter.recording_id)
-        .bind(page.rows())
-        .fetch_all(self.store.reader())
-        .await?;
+        // An index can serve a condition only if it is there whatever is bound, hence one text per case.
+        macro_rules! jobs_where {
+            ($recording:literal) => {
+                concat!(
+                    "SELECT j.*, r.session_id, a.id AS assessment_id
+                     FROM jobs j JOIN recordings r ON r.id = j.recording_id JOIN sessions s ON s.id = r.session_id
+                          LEFT JOIN assessments a ON a.job_id = j.id
+                     WHERE j.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
+                       AND j.id < ?3
+                       AND (?4 IS NULL OR j.state = ?4)
+                       AND ",
+                    $recording,
+                    " ORDER BY j.id DESC LIMIT ?6"
+                )
+            };
+        }
+        let question = match filter.recording_id {
+            Some(_) => jobs_where!("j.recording_id = ?5"),
+            None => jobs_where!("?5 IS NULL"),
+        };
+        let rows = sqlx::query(question)
+            .bind(access.organisation)
+            .bind(access.only_sessions_of())
+            .bind(page.cursor())
+            .bind(filter.state.map(JobState::name))
+            .bind(filter.recording_id)
+            .bind(page.rows())
+            .fetch_all(self.store.reader())
+            .await?;
         let jobs = rows.iter().map(job_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(jobs, page, |job| job.id))
     }

@@ -125,9 +125,10 @@ pub(crate) async fn insert(
 ) -> Result<AssessmentId, StorageError> {
     let id = AssessmentId::new();
     sqlx::query(
-        "INSERT INTO assessments (id, recording_id, job_id, pipeline, method, channels, summary, quality, provenance,
+        "INSERT INTO assessments (id, organisation_id, recording_id, job_id, pipeline, method, channels, summary, quality, provenance,
                                   n_samples, start_time_ns, end_time_ns, created_at)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
+         SELECT ?1, r.organisation_id, r.id, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13
+         FROM recordings r WHERE r.id = ?2",
     )
     .bind(id)
     .bind(recording_id)
@@ -157,7 +158,7 @@ impl Store {
         let row = sqlx::query(
             "SELECT a.*, r.session_id, s.patient_id
              FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
+             WHERE a.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
         )
         .bind(access.organisation)
         .bind(access.only_sessions_of())
@@ -178,29 +179,45 @@ impl Store {
         filter: &AssessmentFilter,
         page: &PageRequest<AssessmentId>,
     ) -> Result<Page<StoredAssessment, AssessmentId>, StorageError> {
-        let rows = sqlx::query(
-            "SELECT a.*, r.session_id, s.patient_id
-             FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
-               AND (?3 IS NULL OR a.id < ?3)
-               AND (?4 IS NULL OR a.recording_id = ?4)
-               AND (?5 IS NULL OR r.session_id = ?5)
-               AND (?6 IS NULL OR s.patient_id = ?6)
-               AND (?7 IS NULL OR a.pipeline = ?7)
-               AND (?8 IS NULL OR a.method = ?8)
-             ORDER BY a.id DESC LIMIT ?9",
-        )
-        .bind(access.organisation)
-        .bind(access.only_sessions_of())
-        .bind(page.after)
-        .bind(filter.recording_id)
-        .bind(filter.session_id)
-        .bind(filter.patient_id)
-        .bind(&filter.pipeline)
-        .bind(&filter.method)
-        .bind(page.rows())
-        .fetch_all(self.reader())
-        .await?;
+        // An index can serve a condition only if it is there whatever is bound, hence one text per case.
+        macro_rules! assessments_where {
+            ($indexed:literal) => {
+                concat!(
+                    "SELECT a.*, r.session_id, s.patient_id
+                     FROM assessments a JOIN recordings r ON r.id = a.recording_id
+                          JOIN sessions s ON s.id = r.session_id
+                     WHERE a.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
+                       AND a.id < ?3
+                       AND (?7 IS NULL OR a.pipeline = ?7)
+                       AND (?8 IS NULL OR a.method = ?8)
+                       AND ",
+                    $indexed,
+                    " ORDER BY a.id DESC LIMIT ?9"
+                )
+            };
+        }
+        let question = match (filter.recording_id, filter.session_id, filter.patient_id) {
+            (Some(_), _, _) => assessments_where!(
+                "a.recording_id = ?4 AND (?5 IS NULL OR r.session_id = ?5) AND (?6 IS NULL OR s.patient_id = ?6)"
+            ),
+            (None, Some(_), _) => {
+                assessments_where!("?4 IS NULL AND r.session_id = ?5 AND (?6 IS NULL OR s.patient_id = ?6)")
+            }
+            (None, None, Some(_)) => assessments_where!("?4 IS NULL AND ?5 IS NULL AND s.patient_id = ?6"),
+            (None, None, None) => assessments_where!("?4 IS NULL AND ?5 IS NULL AND ?6 IS NULL"),
+        };
+        let rows = sqlx::query(question)
+            .bind(access.organisation)
+            .bind(access.only_sessions_of())
+            .bind(page.cursor())
+            .bind(filter.recording_id)
+            .bind(filter.session_id)
+            .bind(filter.patient_id)
+            .bind(&filter.pipeline)
+            .bind(&filter.method)
+            .bind(page.rows())
+            .fetch_all(self.reader())
+            .await?;
         let assessments = rows.iter().map(assessment_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(assessments, page, |assessment| assessment.id))
     }
@@ -214,7 +231,7 @@ impl Store {
         let row = sqlx::query(
             "SELECT a.channels
              FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
+             WHERE a.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
         )
         .bind(access.organisation)
         .bind(access.only_sessions_of())

@@ -1,5 +1,7 @@
 //! Lists in pages: the cursor is the last id that was seen, so a page costs the same wherever it stands.
 
+use uuid::Uuid;
+
 /// Most items that one page may hold.
 pub const MAX_PAGE_ITEMS: u32 = 200;
 
@@ -20,6 +22,14 @@ impl<Id> PageRequest<Id> {
 
     pub(crate) fn items(&self) -> usize {
         self.limit.clamp(1, MAX_PAGE_ITEMS) as usize
+    }
+
+    /// Every id on the page is smaller. A plain bound, and not "no bound on the first page": an index can seek to it.
+    pub(crate) fn cursor(&self) -> Uuid
+    where
+        Id: Copy + Into<Uuid>,
+    {
+        self.after.map_or(Uuid::max(), Into::into)
     }
 
     /// One row more than the page holds tells whether there is a next page.

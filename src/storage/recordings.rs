@@ -84,10 +84,12 @@ pub(crate) async fn insert(
     let size = i64::try_from(new.blob.size_bytes)
         .map_err(|_| StorageError::Corrupt(format!("a blob of {} bytes", new.blob.size_bytes)))?;
     let row = sqlx::query(
-        "INSERT INTO recordings (id, session_id, created_by, size_bytes, sha256, blob_key, inspection, created_at)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) RETURNING *, ?9 AS patient_id",
+        "INSERT INTO recordings (id, organisation_id, session_id, created_by, size_bytes, sha256, blob_key, inspection,
+                                 created_at)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) RETURNING *, ?10 AS patient_id",
     )
     .bind(id)
+    .bind(access.organisation)
     .bind(new.session_id)
     .bind(access.client)
     .bind(size)
@@ -109,7 +111,7 @@ impl Store {
     pub async fn recording(&self, access: &Access, id: RecordingId) -> Result<StoredRecording, StorageError> {
         let row = sqlx::query(
             "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
-             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND r.id = ?3",
+             WHERE r.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND r.id = ?3",
         )
         .bind(access.organisation)
         .bind(access.only_sessions_of())
@@ -130,22 +132,33 @@ impl Store {
         filter: &RecordingFilter,
         page: &PageRequest<RecordingId>,
     ) -> Result<Page<StoredRecording, RecordingId>, StorageError> {
-        let rows = sqlx::query(
-            "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
-             WHERE s.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
-               AND (?3 IS NULL OR r.id < ?3)
-               AND (?4 IS NULL OR r.session_id = ?4)
-               AND (?5 IS NULL OR s.patient_id = ?5)
-             ORDER BY r.id DESC LIMIT ?6",
-        )
-        .bind(access.organisation)
-        .bind(access.only_sessions_of())
-        .bind(page.after)
-        .bind(filter.session_id)
-        .bind(filter.patient_id)
-        .bind(page.rows())
-        .fetch_all(self.reader())
-        .await?;
+        // An index can serve a condition only if it is there whatever is bound, hence one text per case.
+        macro_rules! recordings_where {
+            ($session:literal) => {
+                concat!(
+                    "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
+                     WHERE r.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
+                       AND r.id < ?3
+                       AND (?5 IS NULL OR s.patient_id = ?5)
+                       AND ",
+                    $session,
+                    " ORDER BY r.id DESC LIMIT ?6"
+                )
+            };
+        }
+        let question = match filter.session_id {
+            Some(_) => recordings_where!("r.session_id = ?4"),
+            None => recordings_where!("?4 IS NULL"),
+        };
+        let rows = sqlx::query(question)
+            .bind(access.organisation)
+            .bind(access.only_sessions_of())
+            .bind(page.cursor())
+            .bind(filter.session_id)
+            .bind(filter.patient_id)
+            .bind(page.rows())
+            .fetch_all(self.reader())
+            .await?;
         let recordings = rows.iter().map(recording_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(recordings, page, |recording| recording.id))
     }

@@ -117,26 +117,38 @@ impl Store {
         filter: &SessionFilter,
         page: &PageRequest<SessionId>,
     ) -> Result<Page<Session, SessionId>, StorageError> {
-        let rows = sqlx::query(
-            "SELECT * FROM sessions
-             WHERE organisation_id = ?1 AND (?2 IS NULL OR created_by = ?2)
-               AND (?3 IS NULL OR id < ?3)
-               AND (?4 IS NULL OR patient_id = ?4)
-               AND (?5 IS NULL OR started_at >= ?5)
-               AND (?6 IS NULL OR started_at < ?6)
-               AND (?7 IS NULL OR protocol = ?7)
-             ORDER BY id DESC LIMIT ?8",
-        )
-        .bind(access.organisation)
-        .bind(access.only_sessions_of())
-        .bind(page.after)
-        .bind(filter.patient_id)
-        .bind(filter.started_from.map(ms_from_time))
-        .bind(filter.started_before.map(ms_from_time))
-        .bind(&filter.protocol)
-        .bind(page.rows())
-        .fetch_all(self.reader())
-        .await?;
+        // An index can serve a condition only if it is there whatever is bound, hence one text per case.
+        macro_rules! sessions_where {
+            ($indexed:literal) => {
+                concat!(
+                    "SELECT * FROM sessions
+                     WHERE organisation_id = ?1
+                       AND id < ?3
+                       AND (?5 IS NULL OR started_at >= ?5)
+                       AND (?6 IS NULL OR started_at < ?6)
+                       AND (?7 IS NULL OR protocol = ?7)
+                       AND ",
+                    $indexed,
+                    " ORDER BY id DESC LIMIT ?8"
+                )
+            };
+        }
+        let question = match (filter.patient_id, access.only_sessions_of()) {
+            (Some(_), _) => sessions_where!("patient_id = ?4 AND (?2 IS NULL OR created_by = ?2)"),
+            (None, Some(_)) => sessions_where!("created_by = ?2 AND ?4 IS NULL"),
+            (None, None) => sessions_where!("?2 IS NULL AND ?4 IS NULL"),
+        };
+        let rows = sqlx::query(question)
+            .bind(access.organisation)
+            .bind(access.only_sessions_of())
+            .bind(page.cursor())
+            .bind(filter.patient_id)
+            .bind(filter.started_from.map(ms_from_time))
+            .bind(filter.started_before.map(ms_from_time))
+            .bind(&filter.protocol)
+            .bind(page.rows())
+            .fetch_all(self.reader())
+            .await?;
         let sessions = rows.iter().map(session_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(sessions, page, |session| session.id))
     }

@@ -23,8 +23,9 @@ async fn ten_thousand_jobs_are_each_claimed_once_by_many_workers_of_two_processe
     // Nine thousand and more copies of the job, in one go.
     sqlx::query(
         "WITH RECURSIVE copies (n) AS (SELECT 2 UNION ALL SELECT n + 1 FROM copies WHERE n < ?1)
-         INSERT INTO jobs (id, recording_id, state, max_attempts, due_at, settings, queued_at)
-         SELECT randomblob(16), recording_id, state, max_attempts, due_at, settings, queued_at FROM jobs, copies",
+         INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at)
+         SELECT randomblob(16), organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at
+         FROM jobs, copies",
     )
     .bind(JOBS as i64)
     .execute(&side_door(bench.dir.path()).await)

@@ -169,12 +169,14 @@ async fn a_job_runs_again_after_a_restart_to_the_same_bytes() {
         let id = queue.job(&bench.access, job).await.unwrap().assessment_id.unwrap();
         let found = queue.store().assessment(&bench.access, id).await.unwrap();
         let slice = queue.store().series_of_assessment(&bench.access, id, &SeriesQuery::default()).await.unwrap();
-        let chunks: Vec<(Vec<u8>, Vec<u8>, Vec<u8>, Vec<u8>)> =
-            sqlx::query_as("SELECT value, low, high, flags FROM series_chunks WHERE assessment_id = ?1")
-                .bind(id)
-                .fetch_all(&rows)
-                .await
-                .unwrap();
+        let chunks: Vec<String> = sqlx::query_scalar(
+            "SELECT hex(value) || '/' || hex(low) || '/' || hex(high) || '/' || hex(flags)
+             FROM series_chunks WHERE assessment_id = ?1 ORDER BY channel, chunk",
+        )
+        .bind(id)
+        .fetch_all(&rows)
+        .await
+        .unwrap();
         assert!(!chunks.is_empty());
         stored.push((found.summary, found.provenance, slice.time_ns, chunks));
     }

@@ -8,15 +8,15 @@ use crate::evaluation::{Contender, Evaluation, Trial, TrialSource};
 use crate::recording::import::{Dataset, ImportError, list};
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 use anyhow::bail;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 /// Measure how well estimates agree with a reference.
-#[derive(Debug, Args)]
-pub struct EvaluateArgs {
+#[derive(Debug, clap::Args)]
+pub struct Args {
     #[command(subcommand)]
     what: What,
 }
@@ -32,7 +32,7 @@ enum What {
 /// Prints, for each data set, exercise, method and angle: trials, frames, coverage, and the medians over the trials of
 /// mean absolute error, root mean square error with and without the constant offset, and correlation. `raw` is the
 /// three-point angle of the recorded joints.
-#[derive(Debug, Args)]
+#[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot evaluate joint-angles --data ../shared/data\n  \
     surefoot evaluate joint-angles --data uiprmd --methods raw,smoother --json\n  \
     surefoot evaluate joint-angles --simulated --noise kinect-v2 --seeds 10 --table")]
@@ -70,7 +70,7 @@ struct JointAngleArgs {
 ///
 /// # Errors
 /// When there is nothing to evaluate.
-pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
+pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.what {
         What::JointAngles(args) => joint_angles(args, &mut std::io::stdout().lock()),
     }

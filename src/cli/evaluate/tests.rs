@@ -4,7 +4,7 @@ use clap::Parser;
 #[derive(Parser)]
 struct Command {
     #[command(flatten)]
-    args: EvaluateArgs,
+    args: Args,
 }
 
 fn output_of(words: &[&str]) -> anyhow::Result<String> {

@@ -5,6 +5,7 @@
 
 pub mod calibration;
 pub mod inverse_kinematics;
+pub mod middleware;
 pub mod noise_model;
 pub mod observation;
 pub mod paper;
@@ -54,14 +55,15 @@ pub fn assess(
                 paper::run(&observations, &calibration, noise, settings.particles, settings.seed, monitor, emit)?;
             quality.effective_sample_size = Some(sizes);
         }
-        Method::Smoother => smoother::run(&observations, &calibration, monitor, emit)?,
-        Method::Ik | Method::Nite => {
-            run_closed_geometry(&observations, &calibration, monitor, emit)?;
-            quality.warnings.push(Warning::new(
-                "no_interval",
-                "closed geometry has no model of noise and gives no credible intervals",
-            ));
-        }
+        Method::Smoother => smoother::run(&observations, &calibration, &smoother::Tuning::default(), monitor, emit)?,
+        Method::Ik => run_closed_geometry(&observations, &calibration, monitor, emit)?,
+        Method::Nite => middleware::run(skeleton, &observations, &calibration, monitor, emit)?,
+    }
+    if matches!(settings.method, Method::Ik | Method::Nite) {
+        quality.warnings.push(Warning::new(
+            "no_interval",
+            "this baseline has no model of noise and gives no credible intervals; choose another method for them",
+        ));
     }
     monitor.begin(Step::Summarizing, 0)?;
     let series = builder.finish();

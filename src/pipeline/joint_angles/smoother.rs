@@ -2,7 +2,7 @@
 //! and a backward pass over the whole recording.
 //!
 //! What joint centres cannot show, the twist of a straight limb, is held by a weak prior at zero twist
-//! ([`TWIST_SD_DEG`]); its interval then says how little is known.
+//! ([`Tuning::twist_sd`]); its interval then says how little is known.
 
 use super::calibration::Calibration;
 use super::inverse_kinematics::pose_from_points;
@@ -19,22 +19,43 @@ use crate::pipeline::PipelineError;
 use crate::progress::{Monitor, Step};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Error of a point that is not white noise, metres: the slow, posture-dependent offset of a body tracker, 40 to 56 mm
-/// on the recordings of `methods.md`, of which bones of constant length absorb the larger part.
-const MODEL_SD_M: f64 = 0.015;
-/// Degrees of freedom of the Student-t weight of a point: 4 keeps 95 % of a normal point's weight and takes nearly all
-/// of it from one that is 5 standard deviations off.
-const STUDENT_T_DOF: f64 = 4.0;
+/// What can be tuned, each with the measurement that set it in `docs/measurements.md`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tuning {
+    /// Error of a point that is not white noise, metres: the slow, posture-dependent offset of a body tracker is 40 to
+    /// 56 mm on the recordings of `methods.md`, of which bones of constant length absorb the larger part.
+    pub model_sd_m: f64,
+    /// Degrees of freedom of the Student-t weight of a point: 4 keeps 95 % of a normal point's weight and takes nearly
+    /// all of it from one that is 5 standard deviations off.
+    pub student_t_dof: f64,
+    /// Standard deviation of the twist of a limb about its own axis, radians.
+    pub twist_sd: f64,
+    /// Time over which the twist prior counts once, seconds.
+    pub twist_time_s: f64,
+    /// Spectral density of angular acceleration of the trunk, rad²/s³.
+    pub trunk_density: f64,
+    /// Spectral density of angular acceleration of shoulders, hips, elbows and knees, rad²/s³.
+    pub limb_density: f64,
+    /// How postures and rates start and decay.
+    pub rates: RateSettings,
+}
+
+impl Default for Tuning {
+    fn default() -> Self {
+        Self {
+            model_sd_m: 0.015,
+            student_t_dof: 4.0,
+            twist_sd: 10f64.to_radians(),
+            twist_time_s: 0.5,
+            trunk_density: 10.0,
+            limb_density: 40.0,
+            rates: RateSettings { rate_decay_s: 0.7, initial_sd: 0.5, initial_rate_sd: 1.0, iterations: 3 },
+        }
+    }
+}
+
 /// Weight under which a point counts as an outlier of its frame.
 const OUTLIER_WEIGHT: f64 = 0.25;
-/// Standard deviation of the twist of a limb about its own axis, degrees.
-const TWIST_SD_DEG: f64 = 10.0;
-/// Time over which the twist prior counts once, seconds.
-const TWIST_TIME_S: f64 = 0.5;
-/// Spectral density of angular acceleration, rad²/s³: trunk, shoulders, hips, elbows, knees.
-const ACCELERATION_DENSITY: [f64; 5] = [10.0, 40.0, 40.0, 40.0, 40.0];
-
-const SETTINGS: RateSettings = RateSettings { rate_decay_s: 0.7, initial_sd: 0.5, initial_rate_sd: 1.0, iterations: 3 };
 
 /// Runs the method over a recording; `emit` gets the frames in order.
 ///
@@ -43,12 +64,13 @@ const SETTINGS: RateSettings = RateSettings { rate_decay_s: 0.7, initial_sd: 0.5
 pub fn run(
     observations: &Observations,
     calibration: &Calibration,
+    tuning: &Tuning,
     monitor: &Monitor,
     mut emit: impl FnMut(&Posterior),
 ) -> Result<(), PipelineError> {
     monitor.begin(Step::Estimating, observations.len() as u64)?;
-    let model = Model::new(observations, &calibration.skeleton);
-    let mut filter = RateFilter::new(model.initial_pose(), SETTINGS);
+    let model = Model::new(observations, &calibration.skeleton, tuning);
+    let mut filter = RateFilter::new(model.initial_pose(), tuning.rates);
     for t in 0..observations.len() {
         filter.step(&model, t, observations.interval_s(t));
         monitor.advance(1)?;
@@ -66,14 +88,16 @@ pub fn run(
 struct Model<'a> {
     observations: &'a Observations,
     skeleton: &'a Skeleton,
+    tuning: &'a Tuning,
     /// Inverse variance of each point's coordinates, m⁻².
     precision: [Vector3<f64>; POINT_COUNT],
 }
 
 impl<'a> Model<'a> {
-    fn new(observations: &'a Observations, skeleton: &'a Skeleton) -> Self {
-        let precision = white_noise(observations).map(|white| white.map(|sd| 1.0 / (sd.powi(2) + MODEL_SD_M.powi(2))));
-        Self { observations, skeleton, precision }
+    fn new(observations: &'a Observations, skeleton: &'a Skeleton, tuning: &'a Tuning) -> Self {
+        let model_variance = tuning.model_sd_m.powi(2);
+        let precision = white_noise(observations).map(|white| white.map(|sd| 1.0 / (sd.powi(2) + model_variance)));
+        Self { observations, skeleton, tuning, precision }
     }
 
     fn initial_pose(&self) -> Pose {
@@ -86,7 +110,7 @@ impl<'a> Model<'a> {
     /// Student-t weight of a residual of three coordinates: 1 and a little at zero, falling with its squared length.
     fn weight(&self, point: usize, residual: &Vector3<f64>) -> f64 {
         let distance = residual.component_mul(residual).dot(&self.precision[point]);
-        (STUDENT_T_DOF + 3.0) / (STUDENT_T_DOF + distance)
+        (self.tuning.student_t_dof + 3.0) / (self.tuning.student_t_dof + distance)
     }
 
     fn posterior(&self, t: usize, pose: Pose, covariance: PoseCovariance) -> Posterior {
@@ -133,14 +157,7 @@ impl RateModel<POSE_DIMENSION> for Model<'_> {
     }
 
     fn acceleration_density(&self, _t: usize) -> PoseVector {
-        let [trunk, shoulder, hip, elbow, knee] = ACCELERATION_DENSITY;
-        PoseVector::from_fn(|i, _| match i {
-            0..3 => trunk,
-            3..9 => shoulder,
-            9..15 => hip,
-            15..17 => elbow,
-            _ => knee,
-        })
+        PoseVector::from_fn(|i, _| if i < 3 { self.tuning.trunk_density } else { self.tuning.limb_density })
     }
 }
 
@@ -205,7 +222,7 @@ impl Model<'_> {
         let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.limbs[limb.index()]);
         let twist = 2.0 * quaternion.imag().dot(&limb.reference_direction()).atan2(quaternion.w);
         let twist = twist - std::f64::consts::TAU * (twist / std::f64::consts::TAU).round();
-        let precision = interval_s / (TWIST_TIME_S * TWIST_SD_DEG.to_radians().powi(2));
+        let precision = interval_s / (self.tuning.twist_time_s * self.tuning.twist_sd.powi(2));
         for row in 0..3 {
             gradient[3 + row] -= precision * twist * axis[row];
             for column in 0..3 {
@@ -228,7 +245,8 @@ mod tests {
         let points = forward_kinematics(&skeleton, &truth);
         let observations =
             Observations { time_ns: vec![0], points: vec![points], subject_from_world: Rotation3::identity() };
-        let model = Model::new(&observations, &skeleton);
+        let tuning = Tuning::default();
+        let model = Model::new(&observations, &skeleton, &tuning);
         let (_, jacobian) = forward_kinematics_with_jacobian(&skeleton, &truth);
         let (information, gradient) = model.information(0, &truth);
         let mut expected = PoseCovariance::zeros();
@@ -240,7 +258,7 @@ mod tests {
         }
         let difference = information - expected;
         // The rest is the twist prior, whose interval is the least one for the first frame.
-        let prior = 1e-3 / (TWIST_TIME_S * TWIST_SD_DEG.to_radians().powi(2));
+        let prior = 1e-3 / (tuning.twist_time_s * tuning.twist_sd.powi(2));
         assert!(difference.amax() <= prior * 1.001, "{}", difference.amax());
         assert!(gradient.amax() <= prior, "{}", gradient.amax());
     }

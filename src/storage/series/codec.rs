@@ -27,8 +27,30 @@ pub(super) struct TimeChunk {
     pub(super) bytes: Vec<u8>,
 }
 
-impl TimeChunk {
-    pub(super) fn encode(time_ns: &[i64]) -> Result<Self, StorageError> {
+/// One chunk of one channel.
+#[derive(Debug)]
+pub(super) struct SeriesChunk {
+    /// Smallest and largest finite value; `None` when no value is finite.
+    pub(super) value_range: Option<(f64, f64)>,
+    pub(super) value: Vec<u8>,
+    pub(super) low: Vec<u8>,
+    pub(super) high: Vec<u8>,
+    pub(super) flags: Vec<u8>,
+}
+
+/// Codes chunks one after the other with one context.
+pub(super) struct Encoder {
+    zstd: Compressor<'static>,
+}
+
+impl Encoder {
+    pub(super) fn new() -> Result<Self, StorageError> {
+        let mut zstd = Compressor::new(LEVEL).map_err(not_coded)?;
+        zstd.set_parameter(CParameter::ChecksumFlag(true)).map_err(not_coded)?;
+        Ok(Self { zstd })
+    }
+
+    pub(super) fn encode_time(&mut self, time_ns: &[i64]) -> Result<TimeChunk, StorageError> {
         let (Some(&first_ns), Some(&last_ns)) = (time_ns.first(), time_ns.last()) else {
             return Err(StorageError::Corrupt("a chunk without samples".into()));
         };
@@ -41,52 +63,36 @@ impl TimeChunk {
                 difference.to_le_bytes()
             })
             .collect();
-        Ok(Self { n_samples: time_ns.len(), first_ns, last_ns, bytes: compress(&planes(&differences))? })
+        Ok(TimeChunk { n_samples: time_ns.len(), first_ns, last_ns, bytes: self.compress(&planes(&differences))? })
     }
-}
 
-/// One chunk of one channel.
-#[derive(Debug)]
-pub(super) struct SeriesChunk {
-    /// Smallest and largest finite value; `None` when no value is finite.
-    pub(super) value_range: Option<(f64, f64)>,
-    pub(super) value: Vec<u8>,
-    pub(super) low: Vec<u8>,
-    pub(super) high: Vec<u8>,
-    pub(super) flags: Vec<u8>,
-}
-
-impl SeriesChunk {
-    pub(super) fn encode(series: &Series, range: Range<usize>) -> Result<Self, StorageError> {
+    pub(super) fn encode_series(&mut self, series: &Series, range: Range<usize>) -> Result<SeriesChunk, StorageError> {
         let value = &series.value[range.clone()];
         let finite = || value.iter().copied().filter(|v| v.is_finite());
         let value_range = finite()
             .next()
             .map(|first| (f64::from(finite().fold(first, f32::min)), f64::from(finite().fold(first, f32::max))));
-        Ok(Self {
+        Ok(SeriesChunk {
             value_range,
-            value: encode_f32(value)?,
-            low: encode_f32(&series.low[range.clone()])?,
-            high: encode_f32(&series.high[range.clone()])?,
-            flags: compress(&series.flags[range])?,
+            value: self.encode_f32(value)?,
+            low: self.encode_f32(&series.low[range.clone()])?,
+            high: self.encode_f32(&series.high[range.clone()])?,
+            flags: self.compress(&series.flags[range])?,
         })
     }
-}
 
-fn encode_f32(values: &[f32]) -> Result<Vec<u8>, StorageError> {
-    let words: Vec<[u8; 4]> = values.iter().map(|v| v.to_le_bytes()).collect();
-    compress(&planes(&words))
+    fn encode_f32(&mut self, values: &[f32]) -> Result<Vec<u8>, StorageError> {
+        let words: Vec<[u8; 4]> = values.iter().map(|v| v.to_le_bytes()).collect();
+        self.compress(&planes(&words))
+    }
+
+    fn compress(&mut self, bytes: &[u8]) -> Result<Vec<u8>, StorageError> {
+        self.zstd.compress(bytes).map_err(not_coded)
+    }
 }
 
 fn planes<const N: usize>(words: &[[u8; N]]) -> Vec<u8> {
     (0..N).flat_map(|byte| words.iter().map(move |word| word[byte])).collect()
-}
-
-fn compress(bytes: &[u8]) -> Result<Vec<u8>, StorageError> {
-    let failed = |error| StorageError::Corrupt(format!("a chunk could not be compressed: {error}"));
-    let mut compressor = Compressor::new(LEVEL).map_err(failed)?;
-    compressor.set_parameter(CParameter::ChecksumFlag(true)).map_err(failed)?;
-    compressor.compress(bytes).map_err(failed)
 }
 
 /// Decodes chunks one after the other with one set of buffers.
@@ -106,7 +112,8 @@ impl Decoder {
         let (first, rest) = bytes.split_at(n);
         let (second, rest) = rest.split_at(n);
         let (third, fourth) = rest.split_at(n);
-        into.extend((0..n).map(|i| f32::from_le_bytes([first[i], second[i], third[i], fourth[i]])));
+        let planes = first.iter().zip(second).zip(third).zip(fourth);
+        into.extend(planes.map(|(((a, b), c), d)| f32::from_le_bytes([*a, *b, *c, *d])));
         Ok(())
     }
 
@@ -142,4 +149,8 @@ impl Decoder {
 
 fn damaged(error: std::io::Error) -> StorageError {
     StorageError::Corrupt(format!("a chunk could not be read: {error}"))
+}
+
+fn not_coded(error: std::io::Error) -> StorageError {
+    StorageError::Corrupt(format!("a chunk could not be compressed: {error}"))
 }

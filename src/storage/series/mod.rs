@@ -1,7 +1,7 @@
 //! Series of an assessment, in compressed chunks.
 //!
 //! A chunk holds [`CHUNK_SAMPLES`] samples of one channel: value, low, high and flags, each coded by itself (see
-//! [`codec`]). A read of a time range decodes only the chunks that it touches, and of those only the parts that were
+//! `codec`). A read of a time range decodes only the chunks that it touches, and of those only the parts that were
 //! asked for; one question to the database brings all channels.
 
 mod codec;
@@ -82,16 +82,17 @@ impl EncodedSeries {
         if !assessment.time_ns.is_sorted_by(|a, b| a < b) {
             return Err(StorageError::Corrupt("the times of an assessment do not increase".into()));
         }
+        let mut encoder = codec::Encoder::new()?;
         let mut series = Vec::new();
         for (channel, one) in assessment.series.iter().enumerate() {
             if [one.value.len(), one.low.len(), one.high.len(), one.flags.len()] != [n; 4] {
                 return Err(StorageError::Corrupt(format!("the series `{}` is not as long as its time", one.channel)));
             }
             for (chunk, range) in chunk_ranges(n).enumerate() {
-                series.push((channel as i64, chunk as i64, codec::SeriesChunk::encode(one, range)?));
+                series.push((channel as i64, chunk as i64, encoder.encode_series(one, range)?));
             }
         }
-        let time = chunk_ranges(n).map(|range| codec::TimeChunk::encode(&assessment.time_ns[range]));
+        let time = chunk_ranges(n).map(|range| encoder.encode_time(&assessment.time_ns[range]));
         Ok(Self { time: time.collect::<Result<_, _>>()?, series })
     }
 }

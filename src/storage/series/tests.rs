@@ -18,7 +18,8 @@ async fn store_assessment(clinic: &Clinic, assessment: Assessment) -> Assessment
     let job = JobId::new();
     let mut transaction = clinic.store.begin().await.unwrap();
     sqlx::query(
-        "INSERT INTO jobs (id, recording_id, state, max_attempts, settings, queued_at) VALUES (?1, ?2, 'done', 1, '', 0)",
+        "INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, settings, queued_at)
+         SELECT ?1, organisation_id, id, 'done', 1, '', 0 FROM recordings WHERE id = ?2",
     )
     .bind(job)
     .bind(recording.id)
@@ -69,8 +70,8 @@ proptest! {
             (series.value[i], series.low[i], series.high[i], series.flags[i]) = (*value, *low, *high, *flags);
         }
         let time_ns: Vec<i64> = steps[..n].iter().scan(start, |t, step| { *t = t.wrapping_add(*step); Some(*t) }).collect();
-        let chunk = codec::SeriesChunk::encode(&series, 0..n).unwrap();
-        let time = codec::TimeChunk::encode(&time_ns).unwrap();
+        let chunk = codec::Encoder::new().unwrap().encode_series(&series, 0..n).unwrap();
+        let time = codec::Encoder::new().unwrap().encode_time(&time_ns).unwrap();
         let mut decoder = codec::Decoder::new().unwrap();
         let (mut value, mut low, mut high, mut flags, mut times) = (vec![], vec![], vec![], vec![], vec![]);
         decoder.decode_f32(&chunk.value, n, &mut value).unwrap();
@@ -91,7 +92,7 @@ proptest! {
     #[test]
     fn a_damaged_chunk_is_an_error_and_no_panic(byte in any::<prop::sample::Index>(), bit in 0u8..8, cut in any::<bool>()) {
         let series = wave("x", 500, 0.01);
-        let chunk = codec::SeriesChunk::encode(&series, 0..500).unwrap();
+        let chunk = codec::Encoder::new().unwrap().encode_series(&series, 0..500).unwrap();
         let mut damaged = chunk.value.clone();
         let place = byte.index(damaged.len());
         if cut { damaged.truncate(place) } else { damaged[place] ^= 1 << bit }

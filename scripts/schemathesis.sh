@@ -1,0 +1,65 @@
+#!/bin/sh
+# Holds the running service against its own OpenAPI document, with requests made up by schemathesis.
+#
+#   scripts/schemathesis.sh [BINARY]        default: target/debug/surefoot, built when absent
+#
+# Ends with status 0 only without a single failure. The same requests every time: the seed is fixed and the examples are
+# bounded. schemathesis comes from PyPI into target/schemathesis; the service runs on a free port and a data directory
+# of its own, and both are gone afterwards.
+set -eu
+
+SCHEMATHESIS=4.32.5
+SEED=20261122
+EXAMPLES=20
+
+root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
+binary=${1:-$root/target/debug/surefoot}
+venv=$root/target/schemathesis
+
+if [ ! -x "$binary" ]; then
+    (cd "$root" && cargo build)
+fi
+if [ "$("$venv/bin/schemathesis" --version 2>/dev/null || true)" != "schemathesis, version $SCHEMATHESIS" ]; then
+    python3 -m venv "$venv"
+    "$venv/bin/pip" install --quiet --disable-pip-version-check "schemathesis==$SCHEMATHESIS"
+fi
+
+work=$(mktemp -d)
+server=
+finish() {
+    if [ -n "$server" ]; then
+        kill "$server" 2>/dev/null || true
+        wait "$server" 2>/dev/null || true
+    fi
+    rm -rf "$work"
+}
+trap finish EXIT
+trap 'exit 130' INT TERM
+
+"$binary" serve --json --data-dir "$work/data" --listen 127.0.0.1:0 >"$work/started" 2>"$work/log" &
+server=$!
+attempts=0
+while [ ! -s "$work/started" ]; do
+    attempts=$((attempts + 1))
+    if [ $attempts -gt 100 ] || ! kill -0 "$server" 2>/dev/null; then
+        echo "the service did not start:" >&2
+        cat "$work/log" >&2
+        exit 1
+    fi
+    sleep 0.1
+done
+field() {
+    python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$work/started" "$1"
+}
+address=$(field address)
+SUREFOOT_KEY=$(field admin_key)
+export SUREFOOT_KEY
+
+# A run leaves files in its folder; they belong to the temporary one.
+cd "$work"
+if ! "$venv/bin/schemathesis" --config-file "$root/scripts/schemathesis.toml" run "$address/openapi.json" \
+    --seed "$SEED" --max-examples "$EXAMPLES" --generation-database none --workers 2 --continue-on-failure; then
+    echo "the service's log ends with:" >&2
+    tail -n 40 "$work/log" >&2
+    exit 1
+fi
