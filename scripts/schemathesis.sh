@@ -10,7 +10,7 @@ set -eu
 
 SCHEMATHESIS=4.32.5
 SEED=20261122
-EXAMPLES=20
+EXAMPLES=60
 
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
 binary=${1:-$root/target/debug/surefoot}

@@ -1,6 +1,8 @@
 //! The REST API, asked through its real router on a temporary data directory. Every answer is compared with the
 //! OpenAPI document on its way back.
 
+#![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
+
 mod assessments;
 mod clients;
 mod events;

@@ -92,7 +92,7 @@ async fn permit(state: &AppState, format: Format) -> Result<Option<OwnedSemaphor
 fn unknown_format() -> ApiError {
     let sentence = "the first bytes are neither those of MCAP nor of a JSON object; see the documentation of the \
                     recording format";
-    ApiError::Recording(DecodeError::new("unknown_format", sentence).at("byte 0"))
+    ApiError::Recording(DecodeError::new("not_a_recording", sentence).at("byte 0"))
 }
 
 /// The chunks of a body, counted.
