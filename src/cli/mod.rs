@@ -1,5 +1,7 @@
 //! The commands of the binary: one file per command.
 
+pub mod assess;
+pub mod demo;
 pub mod evaluate;
 pub mod import;
 pub mod key;
@@ -10,6 +12,8 @@ pub mod simulate;
 use clap::{Parser, Subcommand};
 
 /// Cloud assessment of human movement: recordings in, joint angles out.
+///
+/// New here? `surefoot demo` shows the whole journey of one recording in a few seconds.
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true)]
 struct Cli {
@@ -19,7 +23,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::Args),
     Serve(serve::Args),
+    Assess(assess::Args),
     Import(import::Args),
     Simulate(simulate::Args),
     Evaluate(evaluate::Args),
@@ -34,6 +40,8 @@ enum Command {
 pub fn run() -> anyhow::Result<()> {
     let runtime = tokio::runtime::Runtime::new()?;
     match Cli::parse().command {
+        Command::Demo(args) => runtime.block_on(demo::run(&args)),
+        Command::Assess(args) => assess::run(&args),
         Command::Serve(args) => runtime.block_on(serve::run(&args)),
         Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),

@@ -181,6 +181,14 @@ pub fn recording_limits(config: &Config) -> Limits {
 pub async fn run(args: &Args) -> anyhow::Result<()> {
     let running = start(args.config()?).await?;
     announce(&running, args.json);
+    until_told_to_end(running).await
+}
+
+/// Serves until the process is told to end, then ends in order.
+///
+/// # Errors
+/// When the server had failed before.
+pub async fn until_told_to_end(running: Running) -> anyhow::Result<()> {
     ended().await?;
     tracing::info!("ending: requests under way are answered, jobs go back to the queue");
     running.stop().await

@@ -1,0 +1,168 @@
+//! `surefoot assess`: one recording, assessed on this machine without a service.
+
+use crate::assessment::{Assessment, JointAngleSettings, Method, Settings};
+use crate::pipeline;
+use crate::progress::{Monitor, Step};
+use crate::recording::decode::{Limits, decode};
+use crate::recording::{Format, Recording};
+use anyhow::{Context, anyhow};
+use indicatif::{ProgressBar, ProgressStyle};
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Assess one recording on this machine, without a service
+///
+/// Reads a recording (MCAP or JSON, see docs/recording-format.md) and prints one line per joint angle: range, mean and
+/// interval. The same file and settings always give the same numbers as an upload would.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "Examples:\n  surefoot assess squat.mcap\n  surefoot assess squat.mcap --csv angles.csv\n  \
+    surefoot assess squat.json --method paper --particles 2048 --json")]
+pub struct Args {
+    /// Recording, .mcap or .json; the content decides
+    recording: PathBuf,
+    /// smoother (the default), paper (the paper's particle filter), ik (closed geometry), nite (middleware's rotations)
+    #[arg(long, default_value_t = Method::Smoother, value_name = "METHOD")]
+    method: Method,
+    /// Particles of the paper's filter
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536))]
+    particles: u32,
+    /// Seed of the random streams
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Write all series as CSV: time_s, then value, low, high and flags of each channel
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Print summary, quality and provenance as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the file is not a recording, or has no assessment; the sentence says where and what to do.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let bytes = fs::read(&args.recording).with_context(|| format!("cannot read {}", args.recording.display()))?;
+    let recording = recording_of(&bytes).with_context(|| args.recording.display().to_string())?;
+    let settings = Settings::JointAngles(JointAngleSettings {
+        method: args.method,
+        particles: args.particles,
+        seed: args.seed,
+        ..JointAngleSettings::default()
+    });
+    let mut assessment = assess_with_progress(&recording, &settings)?;
+    assessment.provenance.recording_sha256 = hex::encode(Sha256::digest(&bytes));
+    if let Some(path) = &args.csv {
+        write_csv(&assessment, path).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let document = serde_json::json!({
+            "summary": assessment.summary,
+            "quality": assessment.quality,
+            "provenance": assessment.provenance,
+        });
+        writeln!(out, "{}", serde_json::to_string_pretty(&document)?)?;
+    } else {
+        print_summary(&assessment, &mut out)?;
+    }
+    Ok(())
+}
+
+fn recording_of(bytes: &[u8]) -> anyhow::Result<Recording> {
+    let format = Format::sniff(bytes).ok_or_else(|| anyhow!("neither an MCAP file nor a JSON document"))?;
+    decode(bytes, format, &Limits::default()).map_err(|error| match &error.place {
+        Some(place) => anyhow!("{} at {place}: {error}", error.code),
+        None => anyhow!("{}: {error}", error.code),
+    })
+}
+
+/// Runs the pipeline on a thread of its own while this one shows how far it is.
+fn assess_with_progress(recording: &Recording, settings: &Settings) -> anyhow::Result<Assessment> {
+    let monitor = Monitor::default();
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
+    bar.set_style(ProgressStyle::with_template("{msg:12} {bar:40} {pos}/{len}")?);
+    std::thread::scope(|scope| {
+        let viewer = monitor.clone();
+        let work = scope.spawn(|| pipeline::assess(recording, settings, &monitor));
+        while !work.is_finished() {
+            let progress = viewer.progress();
+            bar.set_length(progress.total);
+            bar.set_position(progress.done);
+            bar.set_message(step_name(progress.step));
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        bar.finish_and_clear();
+        let result = work.join().map_err(|_| anyhow!("the pipeline panicked; please report this recording"))?;
+        result.map_err(|error| anyhow!("{error}"))
+    })
+}
+
+fn step_name(step: Step) -> String {
+    format!("{step:?}").to_lowercase()
+}
+
+fn print_summary(assessment: &Assessment, out: &mut dyn Write) -> anyhow::Result<()> {
+    let quality = &assessment.quality;
+    writeln!(
+        out,
+        "{} frames, {:.1} s, all joints seen in {:.0} % of them; method {}",
+        quality.n_frames,
+        quality.duration_s,
+        100.0 * quality.coverage,
+        assessment.provenance.method
+    )?;
+    for warning in &quality.warnings {
+        writeln!(out, "note ({}): {}", warning.code, warning.message)?;
+    }
+    writeln!(out, "\n{:<34}{:>9}{:>9}{:>9}{:>9}{:>12}", "channel", "min", "max", "mean", "covered", "95 % width")?;
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
+    for line in &assessment.summary {
+        writeln!(
+            out,
+            "{:<34}{:>9}{:>9}{:>9}{:>8.0}%{:>12}",
+            line.channel,
+            number(line.min),
+            number(line.max),
+            number(line.mean),
+            100.0 * line.coverage,
+            number(line.interval_width)
+        )?;
+    }
+    Ok(())
+}
+
+fn write_csv(assessment: &Assessment, path: &Path) -> anyhow::Result<()> {
+    let mut writer = csv::Writer::from_path(path)?;
+    let mut header = vec!["time_s".to_owned()];
+    for series in &assessment.series {
+        header.extend(["", "_low", "_high", "_flags"].map(|part| format!("{}{part}", series.channel)));
+    }
+    writer.write_record(&header)?;
+    let number = |value: f32| if value.is_finite() { value.to_string() } else { String::new() };
+    for (t, time_ns) in assessment.time_ns.iter().enumerate() {
+        let mut row = vec![(*time_ns as f64 * 1e-9).to_string()];
+        for series in &assessment.series {
+            row.extend([number(series.value[t]), number(series.low[t]), number(series.high[t])]);
+            row.push(series.flags[t].to_string());
+        }
+        writer.write_record(&row)?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_no_recording_is_refused_with_the_reason() {
+        assert!(recording_of(b"hello").unwrap_err().to_string().contains("neither"));
+        let error = recording_of(br#"{"format": "surefoot", "version": 9}"#).unwrap_err().to_string();
+        assert!(error.contains(": "), "{error}");
+    }
+}
