@@ -52,14 +52,16 @@ fn format(headers: &HeaderMap) -> Result<Option<Format>, ApiError> {
     }
 }
 
-/// A header that may come once, as text.
+/// A header that may come once, as text. One without a value says nothing (RFC 9651, section 3.2, for dictionaries such
+/// as `Content-Digest`), so it counts as absent.
 fn single<'h>(headers: &'h HeaderMap, name: &'static str) -> Result<Option<&'h str>, ApiError> {
     let mut values = headers.get_all(HeaderName::from_static(name)).iter();
     let Some(value) = values.next() else { return Ok(None) };
     if values.next().is_some() {
         return Err(ApiError::field(name, "must come only once"));
     }
-    value.to_str().map(|text| Some(text.trim())).map_err(|_| ApiError::field(name, "must be plain text"))
+    let text = value.to_str().map_err(|_| ApiError::field(name, "must be plain text"))?.trim();
+    Ok((!text.is_empty()).then_some(text))
 }
 
 /// `Content-Digest: sha-256=:base64:` (RFC 9530). Digests by other algorithms are left aside, as the RFC asks.
@@ -131,6 +133,12 @@ mod tests {
         for bad in ["sha-256=AAAA", "sha-256=:AAAA:", "md5=:AAAA:", "nonsense"] {
             assert!(Announced::from_headers(&headers(&[("content-digest", bad)])).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_header_without_a_value_counts_as_absent() {
+        let empty = headers(&[("content-digest", ""), ("x-content-sha256", " "), ("idempotency-key", "")]);
+        assert_eq!(Announced::from_headers(&empty).unwrap(), Announced::from_headers(&HeaderMap::new()).unwrap());
     }
 
     #[test]
