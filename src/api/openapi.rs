@@ -69,6 +69,7 @@ pub(super) fn complete(document: &OpenApi) -> Value {
         }
     }
     add_links(&mut document);
+    name_contents(&mut document);
     let upload = &mut document["paths"]["/v1/sessions/{id}/recordings"]["post"]["requestBody"]["content"];
     upload["application/json"]["example"] = example_recording();
     let schemas = document["components"]["schemas"].clone();
@@ -146,6 +147,45 @@ fn drop_null_defaults(schema: &mut Value) {
             && let Some(property) = property.as_object_mut()
         {
             property.remove("default");
+        }
+    }
+}
+
+/// Says what no Rust type says: bytes are bytes and not a list of numbers, and an event has a name and data.
+fn name_contents(document: &mut Value) {
+    let bytes = json!({"type": "string", "format": "binary"});
+    let event = json!({
+        "type": "object",
+        "properties": {
+            "event": {"type": "string", "enum": ["job"]},
+            "data": {
+                "type": "string",
+                "contentMediaType": "application/json",
+                "contentSchema": {"$ref": "#/components/schemas/JobResponse"},
+            },
+        },
+        "required": ["event", "data"],
+    });
+    let operations = document["paths"].as_object_mut().into_iter().flat_map(|paths| paths.values_mut());
+    for operation in operations.flat_map(|item| item.as_object_mut()).flat_map(|item| item.values_mut()) {
+        let mut messages: Vec<&mut Value> = Vec::new();
+        if let Some(operation) = operation.as_object_mut() {
+            for (name, part) in operation {
+                match name.as_str() {
+                    "requestBody" => messages.push(part),
+                    "responses" => messages.extend(part.as_object_mut().into_iter().flat_map(|all| all.values_mut())),
+                    _ => {}
+                }
+            }
+        }
+        for contents in messages.into_iter().filter_map(|message| message.get_mut("content")?.as_object_mut()) {
+            for (kind, content) in contents {
+                match kind.as_str() {
+                    "application/mcap" | "application/octet-stream" => content["schema"] = bytes.clone(),
+                    "text/event-stream" => content["schema"] = event.clone(),
+                    _ => {}
+                }
+            }
         }
     }
 }

@@ -19,35 +19,27 @@ pub(super) struct Announced {
     pub(super) format: Option<Format>,
     /// Bytes of the body.
     pub(super) length: Option<u64>,
-    /// SHA-256 of the body, lower-case hexadecimal.
-    pub(super) sha256: Option<String>,
+    /// SHA-256 of the body, lower-case hexadecimal, as often as the client says it: each must hold.
+    pub(super) sha256: Vec<String>,
     /// The client's name for this upload.
     pub(super) idempotency_key: Option<String>,
 }
 
 impl Announced {
     pub(super) fn from_headers(headers: &HeaderMap) -> Result<Self, ApiError> {
-        let sha256 = match (digest(headers)?, hexadecimal(headers)?) {
-            (Some(a), Some(b)) if a != b => {
-                return Err(ApiError::field("X-Content-SHA256", "names another digest than Content-Digest; send one"));
-            }
-            (a, b) => a.or(b),
-        };
         Ok(Self {
             format: format(headers)?,
             length: content_length(headers),
-            sha256,
+            sha256: digest(headers)?.into_iter().chain(hexadecimal(headers)?).collect(),
             idempotency_key: idempotency_key(headers)?,
         })
     }
 
     /// Refuses bytes other than those that were announced.
     pub(super) fn check_digest(&self, found: &str) -> Result<(), ApiError> {
-        match &self.sha256 {
-            Some(expected) if expected != found => {
-                Err(ApiError::DigestMismatch { expected: expected.clone(), found: found.to_owned() })
-            }
-            _ => Ok(()),
+        match self.sha256.iter().find(|expected| *expected != found) {
+            None => Ok(()),
+            Some(expected) => Err(ApiError::DigestMismatch { expected: expected.clone(), found: found.to_owned() }),
         }
     }
 }
@@ -60,14 +52,16 @@ fn format(headers: &HeaderMap) -> Result<Option<Format>, ApiError> {
     }
 }
 
-/// A header that may come once, as text.
+/// A header that may come once, as text. One without a value says nothing (RFC 9651, section 3.2, for dictionaries such
+/// as `Content-Digest`), so it counts as absent.
 fn single<'h>(headers: &'h HeaderMap, name: &'static str) -> Result<Option<&'h str>, ApiError> {
     let mut values = headers.get_all(HeaderName::from_static(name)).iter();
     let Some(value) = values.next() else { return Ok(None) };
     if values.next().is_some() {
         return Err(ApiError::field(name, "must come only once"));
     }
-    value.to_str().map(|text| Some(text.trim())).map_err(|_| ApiError::field(name, "must be plain text"))
+    let text = value.to_str().map_err(|_| ApiError::field(name, "must be plain text"))?.trim();
+    Ok((!text.is_empty()).then_some(text))
 }
 
 /// `Content-Digest: sha-256=:base64:` (RFC 9530). Digests by other algorithms are left aside, as the RFC asks.
@@ -128,7 +122,7 @@ mod tests {
         let rfc = format!("sha-512=:AAAA:, sha-256=:{EMPTY_BASE64}:");
         let rfc = Announced::from_headers(&headers(&[("content-digest", &rfc)])).unwrap();
         let plain = Announced::from_headers(&headers(&[("x-content-sha256", &EMPTY_HEX.to_uppercase())])).unwrap();
-        assert_eq!(rfc.sha256.as_deref(), Some(EMPTY_HEX));
+        assert_eq!(rfc.sha256, [EMPTY_HEX]);
         assert_eq!(plain.sha256, rfc.sha256);
         assert!(rfc.check_digest(EMPTY_HEX).is_ok());
         assert!(rfc.check_digest(&"0".repeat(64)).is_err());
@@ -139,9 +133,19 @@ mod tests {
         for bad in ["sha-256=AAAA", "sha-256=:AAAA:", "md5=:AAAA:", "nonsense"] {
             assert!(Announced::from_headers(&headers(&[("content-digest", bad)])).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_header_without_a_value_counts_as_absent() {
+        let empty = headers(&[("content-digest", ""), ("x-content-sha256", " "), ("idempotency-key", "")]);
+        assert_eq!(Announced::from_headers(&empty).unwrap(), Announced::from_headers(&HeaderMap::new()).unwrap());
+    }
+
+    #[test]
+    fn of_two_digests_each_must_hold() {
         let both = [("content-digest", format!("sha-256=:{EMPTY_BASE64}:")), ("x-content-sha256", "0".repeat(64))];
         let both: Vec<_> = both.iter().map(|(name, value)| (*name, value.as_str())).collect();
-        assert!(Announced::from_headers(&headers(&both)).is_err());
+        assert!(Announced::from_headers(&headers(&both)).unwrap().check_digest(EMPTY_HEX).is_err());
     }
 
     #[test]
