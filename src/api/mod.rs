@@ -1,1 +1,90 @@
-//! The REST API: one file per resource.
+//! HTTP: one file per resource.
+//!
+//! Handlers extract, validate, ask the storage or the queue one question, and map the answer. Around all of them stand
+//! [`observe`] (name, count, log, form of refusals), a guard against panics, and compression. Routes and the OpenAPI
+//! document come from the same lines, so they cannot disagree.
+
+pub mod assessments;
+pub mod auth;
+pub mod clients;
+mod docs;
+pub mod error;
+pub mod etag;
+pub mod health;
+pub mod jobs;
+pub mod metrics;
+pub mod observe;
+mod openapi;
+pub mod page;
+pub mod patients;
+pub mod recordings;
+pub mod request;
+pub mod series;
+pub mod sessions;
+pub mod state;
+pub mod text;
+pub mod upload;
+
+pub use state::AppState;
+
+use axum::Router;
+use axum::http::{HeaderName, StatusCode, header};
+use axum::middleware;
+use std::time::Duration;
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
+use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
+use tower_http::sensitive_headers::SetSensitiveRequestHeadersLayer;
+use tower_http::timeout::TimeoutLayer;
+use utoipa_axum::router::OpenApiRouter;
+
+/// Time in which an ordinary request is answered. Uploads, downloads and event streams have no such bound; uploads are
+/// given up when nothing arrives for a while.
+const ORDINARY_TIMEOUT: Duration = Duration::from_secs(30);
+/// Answers below this size are cheaper to send than to compress, bytes.
+const COMPRESS_ABOVE: u64 = 4096;
+/// Headers that no log shows.
+const SECRET_HEADERS: [HeaderName; 2] = [header::AUTHORIZATION, header::COOKIE];
+
+/// Every address of the service.
+pub fn router(state: AppState) -> Router {
+    let (routes, document) = documented_routes().split_for_parts();
+    let compressible = SizeAbove::new(COMPRESS_ABOVE)
+        .and(NotForContentType::SSE)
+        .and(NotForContentType::const_new("application/octet-stream"))
+        .and(NotForContentType::const_new("application/vnd.surefoot.mcap"));
+    routes
+        .merge(docs::router(&openapi::complete(&document)))
+        .fallback(|| async { StatusCode::NOT_FOUND })
+        .layer(CatchPanicLayer::custom(observe::problem_of_panic))
+        .layer(middleware::from_fn(observe::observe))
+        .layer(CompressionLayer::new().compress_when(compressible))
+        .layer(SetSensitiveRequestHeadersLayer::new(SECRET_HEADERS))
+        .with_state(state)
+}
+
+/// The OpenAPI document, as it is served and as it stands in `openapi/openapi.json`.
+pub fn openapi_document() -> String {
+    let (_, document) = documented_routes().split_for_parts();
+    format!("{:#}\n", openapi::complete(&document))
+}
+
+fn documented_routes() -> OpenApiRouter<AppState> {
+    let timeout = TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, ORDINARY_TIMEOUT);
+    let ordinary = OpenApiRouter::new()
+        .merge(patients::router())
+        .merge(sessions::router())
+        .merge(recordings::router())
+        .merge(jobs::router())
+        .merge(assessments::router())
+        .merge(series::router())
+        .merge(clients::router())
+        .merge(health::router())
+        .merge(metrics::router())
+        .layer(timeout);
+    OpenApiRouter::with_openapi(openapi::base())
+        .merge(ordinary)
+        .merge(upload::router())
+        .merge(recordings::content_router())
+        .merge(jobs::events_router())
+}

@@ -115,6 +115,48 @@ impl Store {
         patient_from_row(&row)
     }
 
+    /// Changes a patient of the organisation: reads it, lets `change` alter it, and writes it, all in one transaction.
+    /// What identifies it (`id`, `created_at`) stays whatever `change` does.
+    ///
+    /// # Errors
+    /// `NotFound` when there is none; `Conflict` with code `pseudonym_taken`.
+    pub async fn update_patient(
+        &self,
+        access: &Access,
+        id: PatientId,
+        change: impl FnOnce(&mut Patient) + Send,
+    ) -> Result<Patient, StorageError> {
+        let mut transaction = self.begin().await?;
+        let row = sqlx::query("SELECT * FROM patients WHERE organisation_id = ?1 AND id = ?2")
+            .bind(access.organisation)
+            .bind(id)
+            .fetch_optional(&mut *transaction)
+            .await?
+            .ok_or(StorageError::not_found("patient"))?;
+        let mut patient = patient_from_row(&row)?;
+        change(&mut patient);
+        let row = sqlx::query(
+            "UPDATE patients SET pseudonym = ?3, birth_year = ?4, sex = ?5, height_m = ?6, uses_walking_aid = ?7
+             WHERE organisation_id = ?1 AND id = ?2 RETURNING *",
+        )
+        .bind(access.organisation)
+        .bind(id)
+        .bind(&patient.pseudonym)
+        .bind(patient.birth_year)
+        .bind(patient.sex.map(Sex::name))
+        .bind(patient.height_m)
+        .bind(patient.uses_walking_aid)
+        .fetch_one(&mut *transaction)
+        .await
+        .map_err(|error| {
+            StorageError::conflict_if_not_unique(error, "pseudonym_taken", || {
+                format!("there is already a patient with the pseudonym `{}`", patient.pseudonym)
+            })
+        })?;
+        transaction.commit().await?;
+        patient_from_row(&row)
+    }
+
     /// One patient of the organisation.
     ///
     /// # Errors

@@ -27,6 +27,9 @@ const HEARTBEAT: Duration = Duration::from_millis(250);
 /// another process has stored.
 const POLL: Duration = Duration::from_secs(1);
 
+/// Metric: time from the request for a job to the beginning of an attempt, seconds.
+const JOB_WAIT: &str = "surefoot_job_wait_seconds";
+
 /// The computation of one attempt, on a blocking thread.
 pub type Assess =
     dyn Fn(BlobReader, &StoredRecording, &Settings, &Monitor) -> Result<Assessment, AttemptError> + Send + Sync;
@@ -117,6 +120,9 @@ impl Worker {
     /// When the database fails; a claimed job runs again then, after its lease.
     pub async fn run_next(&self) -> Result<Ran, StorageError> {
         let Some(job) = self.queue.claim(&self.name).await? else { return Ok(Ran::QueueEmpty) };
+        if let Some(started_at) = job.started_at {
+            metrics::histogram!(JOB_WAIT).record((started_at - job.queued_at).as_seconds_f64());
+        }
         let monitor = Monitor::default();
         match self.attempt(&job, &monitor).await {
             Ok(assessment) => self.save(&job, assessment, &monitor).await?,

@@ -111,6 +111,14 @@ impl BlobStore {
         })
     }
 
+    /// Succeeds when an upload could be received: the readiness check. It leaves nothing.
+    ///
+    /// # Errors
+    /// When no part file can be made.
+    pub async fn check_ready(&self) -> Result<(), StorageError> {
+        self.writer().await.map(drop)
+    }
+
     /// Opens a blob for reading on a blocking thread; it is never in memory as a whole.
     ///
     /// # Errors

@@ -1,0 +1,155 @@
+//! What the headers of an upload say of its body.
+
+use crate::api::error::{ApiError, FieldError};
+use crate::api::request::{content_length, media_type};
+use crate::recording::decode::Format;
+use axum::http::{HeaderMap, HeaderName};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+const ACCEPTED: &str = "application/mcap, application/json or application/octet-stream";
+/// Content types of MCAP beside those that `Format` knows.
+const VENDOR_MCAP: &str = "application/vnd.surefoot.mcap";
+const UNKNOWN: &str = "application/octet-stream";
+
+/// What is known of an upload before its first byte.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Announced {
+    /// The format, when the content type says it.
+    pub(super) format: Option<Format>,
+    /// Bytes of the body.
+    pub(super) length: Option<u64>,
+    /// SHA-256 of the body, lower-case hexadecimal.
+    pub(super) sha256: Option<String>,
+    /// The client's name for this upload.
+    pub(super) idempotency_key: Option<String>,
+}
+
+impl Announced {
+    pub(super) fn from_headers(headers: &HeaderMap) -> Result<Self, ApiError> {
+        let sha256 = match (digest(headers)?, hexadecimal(headers)?) {
+            (Some(a), Some(b)) if a != b => {
+                return Err(ApiError::field("X-Content-SHA256", "names another digest than Content-Digest; send one"));
+            }
+            (a, b) => a.or(b),
+        };
+        Ok(Self {
+            format: format(headers)?,
+            length: content_length(headers),
+            sha256,
+            idempotency_key: idempotency_key(headers)?,
+        })
+    }
+
+    /// Refuses bytes other than those that were announced.
+    pub(super) fn check_digest(&self, found: &str) -> Result<(), ApiError> {
+        match &self.sha256 {
+            Some(expected) if expected != found => {
+                Err(ApiError::DigestMismatch { expected: expected.clone(), found: found.to_owned() })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn format(headers: &HeaderMap) -> Result<Option<Format>, ApiError> {
+    match media_type(headers).as_deref() {
+        None | Some(UNKNOWN) => Ok(None),
+        Some(VENDOR_MCAP) => Ok(Some(Format::Mcap)),
+        Some(name) => Format::from_content_type(name).map(Some).ok_or(ApiError::UnsupportedMediaType(ACCEPTED)),
+    }
+}
+
+/// A header that may come once, as text.
+fn single<'h>(headers: &'h HeaderMap, name: &'static str) -> Result<Option<&'h str>, ApiError> {
+    let mut values = headers.get_all(HeaderName::from_static(name)).iter();
+    let Some(value) = values.next() else { return Ok(None) };
+    if values.next().is_some() {
+        return Err(ApiError::field(name, "must come only once"));
+    }
+    value.to_str().map(|text| Some(text.trim())).map_err(|_| ApiError::field(name, "must be plain text"))
+}
+
+/// `Content-Digest: sha-256=:base64:` (RFC 9530). Digests by other algorithms are left aside, as the RFC asks.
+fn digest(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+    let Some(list) = single(headers, "content-digest")? else { return Ok(None) };
+    let wrong = || ApiError::field("Content-Digest", "must be sha-256=:<44 characters of base64>:");
+    let mut found = None;
+    for entry in list.split(',') {
+        let (algorithm, value) = entry.trim().split_once('=').ok_or_else(wrong)?;
+        if algorithm == "sha-256" {
+            let base64 = value.strip_prefix(':').and_then(|value| value.strip_suffix(':')).ok_or_else(wrong)?;
+            let bytes = STANDARD.decode(base64).map_err(|_| wrong())?;
+            if bytes.len() != 32 {
+                return Err(wrong());
+            }
+            found = Some(hex::encode(bytes));
+        }
+    }
+    found.map(Some).ok_or_else(wrong)
+}
+
+fn hexadecimal(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+    let Some(text) = single(headers, "x-content-sha256")? else { return Ok(None) };
+    if text.len() == 64 && text.bytes().all(|b| b.is_ascii_hexdigit()) {
+        return Ok(Some(text.to_ascii_lowercase()));
+    }
+    Err(ApiError::field("X-Content-SHA256", "must be 64 hexadecimal digits"))
+}
+
+fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+    let Some(key) = single(headers, "idempotency-key")? else { return Ok(None) };
+    let plain = key.bytes().all(|b| b.is_ascii_alphanumeric() || b"._:-".contains(&b));
+    if plain && (1..=128).contains(&key.len()) {
+        return Ok(Some(key.to_owned()));
+    }
+    let message = "must be 1 to 128 letters, digits, `.`, `_`, `:` or `-`; a UUID does";
+    Err(ApiError::InvalidRequest(vec![FieldError::new("Idempotency-Key", message)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::HeaderValue;
+
+    /// SHA-256 of no bytes.
+    const EMPTY_HEX: &str = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+    const EMPTY_BASE64: &str = "47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=";
+
+    fn headers(list: &[(&'static str, &str)]) -> HeaderMap {
+        let pair = |(name, value): &(&'static str, &str)| {
+            (HeaderName::from_static(name), HeaderValue::from_str(value).unwrap())
+        };
+        list.iter().map(pair).collect()
+    }
+
+    #[test]
+    fn both_spellings_of_a_digest_are_read() {
+        let rfc = format!("sha-512=:AAAA:, sha-256=:{EMPTY_BASE64}:");
+        let rfc = Announced::from_headers(&headers(&[("content-digest", &rfc)])).unwrap();
+        let plain = Announced::from_headers(&headers(&[("x-content-sha256", &EMPTY_HEX.to_uppercase())])).unwrap();
+        assert_eq!(rfc.sha256.as_deref(), Some(EMPTY_HEX));
+        assert_eq!(plain.sha256, rfc.sha256);
+        assert!(rfc.check_digest(EMPTY_HEX).is_ok());
+        assert!(rfc.check_digest(&"0".repeat(64)).is_err());
+    }
+
+    #[test]
+    fn a_digest_that_cannot_be_read_is_refused_and_not_ignored() {
+        for bad in ["sha-256=AAAA", "sha-256=:AAAA:", "md5=:AAAA:", "nonsense"] {
+            assert!(Announced::from_headers(&headers(&[("content-digest", bad)])).is_err(), "{bad}");
+        }
+        let both = [("content-digest", format!("sha-256=:{EMPTY_BASE64}:")), ("x-content-sha256", "0".repeat(64))];
+        let both: Vec<_> = both.iter().map(|(name, value)| (*name, value.as_str())).collect();
+        assert!(Announced::from_headers(&headers(&both)).is_err());
+    }
+
+    #[test]
+    fn the_content_type_names_the_format_or_leaves_it_to_the_bytes() {
+        let format = |kind: &str| Announced::from_headers(&headers(&[("content-type", kind)])).map(|a| a.format);
+        assert_eq!(format("application/json; charset=utf-8").unwrap(), Some(Format::Json));
+        assert_eq!(format("application/vnd.surefoot.mcap").unwrap(), Some(Format::Mcap));
+        assert_eq!(format("application/octet-stream").unwrap(), None);
+        assert!(matches!(format("text/plain"), Err(ApiError::UnsupportedMediaType(_))));
+    }
+}

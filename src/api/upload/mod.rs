@@ -1,0 +1,160 @@
+//! Upload of a recording: streamed, checked while it arrives, stored whole or not at all.
+//!
+//! Nothing is a row before the last byte was seen: the bytes go to a part file that vanishes when anything is wrong
+//! with them or the client goes away.
+
+mod announced;
+mod arrival;
+
+use super::auth::Caller;
+use super::error::{ApiError, Problem};
+use super::jobs::JobResponse;
+use super::recordings::RecordingResponse;
+use super::request::ApiPath;
+use super::sessions::SessionPath;
+use super::state::AppState;
+use crate::assessment::Settings;
+use crate::storage::{ClientId, IdempotencyClaim, NewRecording, SessionId, StoredResponse};
+use announced::Announced;
+use arrival::Arrived;
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use utoipa::ToSchema;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+/// Says that an answer was given before.
+const REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
+
+/// Routes of this file. No time limit on the whole: an upload takes as long as its line is slow.
+pub fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(upload_recording))
+}
+
+/// A stored recording and the job that assesses it.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct UploadResponse {
+    /// The recording.
+    pub recording: RecordingResponse,
+    /// The job.
+    pub job: JobResponse,
+}
+
+/// Upload a recording
+///
+/// The body is the recording itself: MCAP with the profile `surefoot`, or a JSON recording; `application/octet-stream`
+/// is recognised by its first bytes. Everything in it is checked while it arrives, so a defect is told at once, with
+/// its place. The answer names the job that assesses it.
+///
+/// A digest, when one is sent, is compared with what arrived. An `Idempotency-Key` makes it safe to send the same
+/// upload again: the first answer is repeated and nothing is stored twice. Without one, a second upload is a second
+/// recording.
+#[utoipa::path(post, path = "/v1/sessions/{id}/recordings", tag = "recordings", operation_id = "upload_recording",
+    params(SessionPath,
+        ("Content-Digest" = Option<String>, Header, description = "SHA-256 of the body (RFC 9530)",
+            pattern = "^sha-256=:[A-Za-z0-9+/]{43}=:$"),
+        ("X-Content-SHA256" = Option<String>, Header, description = "SHA-256 of the body, hexadecimal",
+            pattern = "^[0-9a-fA-F]{64}$"),
+        ("Idempotency-Key" = Option<String>, Header, description = "Name of this upload, chosen by the client; the \
+            same key for the same upload", pattern = "^[A-Za-z0-9._:-]{1,128}$")),
+    request_body(description = "The recording", content(
+        (Vec<u8> = "application/mcap"), (Vec<u8> = "application/octet-stream"), (Object = "application/json"))),
+    responses((status = 202, description = "Stored; Location says where its job lives", body = UploadResponse,
+                headers(("Location" = String, description = "Address of the job"))),
+              (status = 409, description = "The same upload is being received at this moment", body = Problem,
+               content_type = "application/problem+json")))]
+async fn upload_recording(
+    State(state): State<AppState>,
+    caller: Caller,
+    ApiPath(path): ApiPath<SessionPath>,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<Response, ApiError> {
+    let session = state.store.session(&caller.access, path.id).await?;
+    let announced = Announced::from_headers(&headers)?;
+    let arrived = arrival::receive(&state, &announced, body).await?;
+    announced.check_digest(arrived.sealed.sha256())?;
+
+    let Some(key) = &announced.idempotency_key else {
+        return Ok(response(&store(&state, &caller, session.id, arrived).await?));
+    };
+    let client = caller.client.id;
+    let fingerprint = fingerprint(session.id, &arrived);
+    match state.store.claim_idempotency_key(client, key, &fingerprint).await? {
+        IdempotencyClaim::Fresh => {}
+        IdempotencyClaim::Replay(answer) => return Ok(replayed(&answer)),
+        IdempotencyClaim::Mismatch => return Err(ApiError::IdempotencyKeyReused),
+        IdempotencyClaim::InProgress => {
+            let detail = "The same upload is being received at this moment. Wait a second and send it again.";
+            return Err(ApiError::Conflict("request_in_progress", detail.into()));
+        }
+    }
+    match store(&state, &caller, session.id, arrived).await {
+        Ok(answer) => {
+            remember(&state, client, key, &answer).await;
+            Ok(response(&answer))
+        }
+        Err(error) => {
+            state.store.release_idempotency_key(client, key).await?;
+            Err(error)
+        }
+    }
+}
+
+/// What decides whether two uploads under one key are the same.
+fn fingerprint(session: SessionId, arrived: &Arrived) -> String {
+    let mut hash = Sha256::new();
+    hash.update(session.0.as_bytes());
+    hash.update([arrived.inspection.format as u8]);
+    hash.update(arrived.sealed.sha256().as_bytes());
+    hex::encode(hash.finalize())
+}
+
+/// Keeps the bytes, then makes recording and job in one transaction; the answer is what the client gets.
+async fn store(
+    state: &AppState,
+    caller: &Caller,
+    session_id: SessionId,
+    arrived: Arrived,
+) -> Result<StoredResponse, ApiError> {
+    let blob = arrived.sealed.keep().await?;
+    let new = NewRecording { session_id, blob, inspection: arrived.inspection };
+    let (recording, job) = state.queue.submit(&caller.access, &new, &Settings::default()).await?;
+    let location = format!("/v1/jobs/{}", job.id);
+    let body = UploadResponse { recording: recording.into(), job: job.into() };
+    Ok(StoredResponse {
+        status: StatusCode::ACCEPTED.as_u16(),
+        headers: vec![(header::LOCATION.to_string(), location)],
+        body: serde_json::to_vec(&body).map_err(ApiError::internal)?,
+    })
+}
+
+/// Keeps the answer for a repeated request. The recording is stored already: a failure here is no reason to tell the
+/// client otherwise.
+async fn remember(state: &AppState, client: ClientId, key: &str, answer: &StoredResponse) {
+    if let Err(error) = state.store.complete_idempotency_key(client, key, answer).await {
+        tracing::error!(error = format!("{error:#}"), "the answer to an upload could not be kept for a repetition");
+    }
+}
+
+fn response(answer: &StoredResponse) -> Response {
+    let status = StatusCode::from_u16(answer.status).unwrap_or(StatusCode::ACCEPTED);
+    let mut response = (status, answer.body.clone()).into_response();
+    response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
+    for (name, value) in &answer.headers {
+        if let (Ok(name), Ok(value)) = (HeaderName::try_from(name), HeaderValue::try_from(value)) {
+            response.headers_mut().insert(name, value);
+        }
+    }
+    response
+}
+
+fn replayed(answer: &StoredResponse) -> Response {
+    let mut response = response(answer);
+    response.headers_mut().insert(REPLAYED, HeaderValue::from_static("true"));
+    response
+}

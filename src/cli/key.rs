@@ -1,0 +1,179 @@
+//! `surefoot key`: API keys, made and revoked at the machine itself.
+
+use super::serve;
+use crate::storage::{Client, ClientId, OrganisationId, Role, Store, StorageError};
+use anyhow::{Context, bail};
+use std::path::PathBuf;
+use uuid::Uuid;
+
+/// Make, list and revoke API keys
+///
+/// Works on the data directory itself, also while the service runs. The text of a key is shown once, when it is made;
+/// only its digest is stored.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Args {
+    /// Data directory; default: as `surefoot serve` would choose.
+    #[arg(long, global = true, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    /// Configuration file; default: `surefoot.toml` when it exists.
+    #[arg(long, global = true, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print JSON, for programs.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Clone, clap::Subcommand)]
+enum Action {
+    /// Make a key and print it, once
+    Create {
+        /// What the key may do: `device` uploads, `clinician` reads patients, `admin` also manages keys.
+        #[arg(long, value_enum)]
+        role: RoleName,
+        /// Whose key it is, for people.
+        #[arg(long)]
+        label: String,
+        /// Organisation by name; it is made when absent. Default: the only one there is, or `default`.
+        #[arg(long, value_name = "NAME")]
+        organisation: Option<String>,
+    },
+    /// List keys, revoked ones too
+    List,
+    /// Take a key out of use, at once
+    Revoke {
+        /// The client's id, as `list` shows it.
+        id: Uuid,
+    },
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum RoleName {
+    Device,
+    Clinician,
+    Admin,
+}
+
+impl From<RoleName> for Role {
+    fn from(name: RoleName) -> Self {
+        match name {
+            RoleName::Device => Role::Device,
+            RoleName::Clinician => Role::Clinician,
+            RoleName::Admin => Role::Admin,
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the data directory cannot be opened or the request contradicts what is stored.
+pub async fn run(args: &Args) -> anyhow::Result<()> {
+    let mut config = serve::load_config(args.config.as_deref())?;
+    if let Some(data_dir) = &args.data_dir {
+        config.data_dir.clone_from(data_dir);
+    }
+    let store = Store::open(&config.data_dir)
+        .await
+        .with_context(|| format!("cannot open the data directory {}", config.data_dir.display()))?;
+    let result = match &args.action {
+        Action::Create { role, label, organisation } => {
+            create(&store, (*role).into(), label, organisation.as_deref(), args.json).await
+        }
+        Action::List => list(&store, args.json).await,
+        Action::Revoke { id } => revoke(&store, ClientId(*id), args.json).await,
+    };
+    store.close().await;
+    result
+}
+
+async fn create(
+    store: &Store,
+    role: Role,
+    label: &str,
+    organisation: Option<&str>,
+    json: bool,
+) -> anyhow::Result<()> {
+    if label.is_empty() || label.chars().count() > 64 || label.chars().any(char::is_control) {
+        bail!("the label must be one line of 1 to 64 characters");
+    }
+    let organisation = organisation_for(store, organisation).await?;
+    let (client, key) = store.create_client(organisation, role, label).await?;
+    if json {
+        println!("{}", serde_json::json!({"client": described(&client), "key": key.reveal()}));
+    } else {
+        println!("{}", key.reveal());
+        eprintln!("client {} ({}, {label}); the key is shown this once", client.id, role.name());
+    }
+    Ok(())
+}
+
+async fn organisation_for(store: &Store, name: Option<&str>) -> anyhow::Result<OrganisationId> {
+    let Some(name) = name else {
+        let all = store.organisations().await?;
+        return match all.as_slice() {
+            [] => Ok(store.create_organisation("default").await?.id),
+            [only] => Ok(only.id),
+            several => {
+                let names: Vec<&str> = several.iter().map(|organisation| organisation.name.as_str()).collect();
+                bail!("there are several organisations; name one with --organisation: {}", names.join(", "))
+            }
+        };
+    };
+    match store.organisation_named(name).await {
+        Ok(organisation) => Ok(organisation.id),
+        Err(StorageError::NotFound { .. }) => Ok(store.create_organisation(name).await?.id),
+        Err(error) => Err(error.into()),
+    }
+}
+
+async fn list(store: &Store, json: bool) -> anyhow::Result<()> {
+    let mut rows = Vec::new();
+    for organisation in store.organisations().await? {
+        for client in store.clients(organisation.id).await? {
+            if json {
+                let mut row = described(&client);
+                row["organisation"] = organisation.name.clone().into();
+                rows.push(row);
+            } else {
+                let state = if client.revoked_at.is_some() { "revoked" } else { "valid" };
+                println!("{}  {:9}  {state:7}  {}  {}", client.id, client.role.name(), organisation.name, client.label);
+            }
+        }
+    }
+    if json {
+        println!("{}", serde_json::json!({ "clients": rows }));
+    }
+    Ok(())
+}
+
+async fn revoke(store: &Store, id: ClientId, json: bool) -> anyhow::Result<()> {
+    for organisation in store.organisations().await? {
+        match store.revoke_client(organisation.id, id).await {
+            Ok(client) if json => {
+                println!("{}", described(&client));
+                return Ok(());
+            }
+            Ok(client) => {
+                println!("revoked {} ({}, {})", client.id, client.role.name(), client.label);
+                return Ok(());
+            }
+            Err(StorageError::NotFound { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    bail!("there is no client {id}; `surefoot key list` shows those there are")
+}
+
+fn described(client: &Client) -> serde_json::Value {
+    let rfc3339 = |time: time::OffsetDateTime| time.format(&time::format_description::well_known::Rfc3339).ok();
+    serde_json::json!({
+        "id": client.id,
+        "role": client.role,
+        "label": client.label,
+        "created_at": rfc3339(client.created_at),
+        "revoked_at": client.revoked_at.and_then(rfc3339),
+        "last_used_at": client.last_used_at.and_then(rfc3339),
+    })
+}

@@ -1,0 +1,251 @@
+//! `surefoot serve`: the service on one machine.
+
+use crate::api::{self, AppState};
+use crate::config::Config;
+use crate::queue::{Queue, QueueSettings};
+use crate::recording::decode::Limits;
+use crate::storage::Store;
+use crate::worker;
+use anyhow::Context;
+use std::collections::HashMap;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio::task::{JoinHandle, JoinSet};
+use tokio_util::sync::CancellationToken;
+
+/// Read when it exists and no other file is named.
+const DEFAULT_FILE: &str = "surefoot.toml";
+/// Time for requests under way to end after a signal.
+const GRACE: Duration = Duration::from_secs(20);
+/// How often the recorder of metrics folds its samples; without it they would pile up until somebody scrapes.
+const METRICS_UPKEEP: Duration = Duration::from_secs(5);
+
+/// Run the service
+///
+/// Serves the REST API and runs the workers in one process, on one data directory (SQLite and a folder of blobs).
+/// Settings come from, later ones winning: defaults, the configuration file, environment variables `SUREFOOT_…` (for
+/// example SUREFOOT_DATA_DIR), flags. The first start with an empty database prints an admin key, once. Ctrl-C ends it
+/// in an orderly way; jobs that run are taken up again by the next start.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct Args {
+    /// Configuration file in TOML; default: `surefoot.toml` when it exists.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Directory of the database and the recordings; made when absent.
+    #[arg(long, value_name = "DIR")]
+    pub data_dir: Option<PathBuf>,
+    /// Address to listen on; port 0 chooses a free one.
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub listen: Option<SocketAddr>,
+    /// Jobs that run at the same time.
+    #[arg(long, value_name = "N")]
+    pub workers: Option<usize>,
+    /// Largest accepted recording, bytes.
+    #[arg(long, value_name = "BYTES")]
+    pub max_recording_bytes: Option<u64>,
+    /// Print one line of JSON with the address and, on the first start, the admin key; for programs.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Args {
+    /// The configuration of all sources, the flags last.
+    ///
+    /// # Errors
+    /// When a source cannot be read or holds a value that does not fit.
+    pub fn config(&self) -> anyhow::Result<Config> {
+        let mut config = load_config(self.config.as_deref())?;
+        if let Some(data_dir) = &self.data_dir {
+            config.data_dir.clone_from(data_dir);
+        }
+        config.listen = self.listen.unwrap_or(config.listen);
+        config.workers = self.workers.unwrap_or(config.workers);
+        config.max_recording_bytes = self.max_recording_bytes.unwrap_or(config.max_recording_bytes);
+        Ok(config)
+    }
+}
+
+/// The configuration of file and environment.
+///
+/// # Errors
+/// When a source cannot be read or holds a value that does not fit.
+pub fn load_config(file: Option<&Path>) -> anyhow::Result<Config> {
+    config_of_sources(file, std::env::vars().collect())
+}
+
+fn config_of_sources(file: Option<&Path>, environment: HashMap<String, String>) -> anyhow::Result<Config> {
+    let defaults = config::Config::try_from(&Config::default())?;
+    // Other programs of this project read variables with the same prefix; only names of settings are taken.
+    let names: Vec<String> = serde_json::to_value(Config::default())?
+        .as_object()
+        .map(|fields| fields.keys().map(|name| format!("SUREFOOT_{}", name.to_uppercase())).collect())
+        .unwrap_or_default();
+    let known = environment.into_iter().filter(|(name, _)| names.contains(&name.to_uppercase())).collect();
+    let file = match file {
+        Some(path) => config::File::from(path).format(config::FileFormat::Toml).required(true),
+        None => config::File::from(Path::new(DEFAULT_FILE)).format(config::FileFormat::Toml).required(false),
+    };
+    config::Config::builder()
+        .add_source(defaults)
+        .add_source(file)
+        .add_source(config::Environment::with_prefix("SUREFOOT").try_parsing(true).source(Some(known)))
+        .build()
+        .and_then(config::Config::try_deserialize)
+        .context("the configuration cannot be used")
+}
+
+/// A service that runs in this process.
+#[derive(Debug)]
+pub struct Running {
+    /// Where it listens.
+    pub addr: SocketAddr,
+    /// The first admin key, when this start made one. It cannot be shown again.
+    pub admin_key: Option<String>,
+    store: Store,
+    stop: CancellationToken,
+    server: JoinHandle<std::io::Result<()>>,
+    workers: JoinSet<()>,
+}
+
+impl Running {
+    /// Ends it: no new requests, those under way are answered, jobs under way go back to the queue.
+    ///
+    /// # Errors
+    /// When the server had failed before.
+    pub async fn stop(mut self) -> anyhow::Result<()> {
+        self.stop.cancel();
+        let mut server = self.server;
+        let served = match tokio::time::timeout(GRACE, &mut server).await {
+            Ok(served) => served.context("the server panicked")?.context("the server failed"),
+            Err(_) => {
+                tracing::warn!("some requests did not end in time and were cut off");
+                server.abort();
+                Ok(())
+            }
+        };
+        let at_rest = async { while self.workers.join_next().await.is_some() {} };
+        if tokio::time::timeout(GRACE, at_rest).await.is_err() {
+            tracing::warn!("some jobs did not stop in time; their lease expires and they run again");
+            self.workers.abort_all();
+        }
+        self.store.close().await;
+        served
+    }
+}
+
+/// Opens the data directory, starts workers and server, and returns once requests are accepted.
+///
+/// # Errors
+/// When the data directory cannot be used or the address is taken.
+pub async fn start(config: Config) -> anyhow::Result<Running> {
+    let store = Store::open(&config.data_dir)
+        .await
+        .with_context(|| format!("cannot open the data directory {}", config.data_dir.display()))?;
+    let admin_key = store.ensure_first_admin().await?.map(|key| key.reveal().to_owned());
+    let queue = Queue::new(store.clone(), QueueSettings::from(&config));
+    let listener =
+        TcpListener::bind(config.listen).await.with_context(|| format!("cannot listen on {}", config.listen))?;
+    let addr = listener.local_addr()?;
+    let limits = recording_limits(&config);
+    let n_workers = config.workers;
+    let state = AppState::new(queue.clone(), config, limits.clone())?;
+    let stop = state.shutdown.clone();
+
+    let mut workers = worker::spawn(&queue, n_workers, &limits, &stop);
+    let metrics = state.metrics.clone();
+    let upkeep = stop.clone();
+    workers.spawn(async move {
+        let mut ticks = tokio::time::interval(METRICS_UPKEEP);
+        while upkeep.run_until_cancelled(ticks.tick()).await.is_some() {
+            metrics.run_upkeep();
+        }
+    });
+    let router = api::router(state);
+    let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
+    let server = tokio::spawn(serving.into_future());
+    Ok(Running { addr, admin_key, store, stop, server, workers })
+}
+
+/// How much of a recording is accepted.
+pub fn recording_limits(config: &Config) -> Limits {
+    let max_json_bytes = usize::try_from(config.max_json_recording_bytes).unwrap_or(usize::MAX);
+    Limits { max_json_bytes, ..Limits::default() }
+}
+
+/// Runs the service until it is told to end.
+///
+/// # Errors
+/// When it cannot start, or fails while it runs.
+pub async fn run(args: &Args) -> anyhow::Result<()> {
+    let running = start(args.config()?).await?;
+    announce(&running, args.json);
+    ended().await?;
+    tracing::info!("ending: requests under way are answered, jobs go back to the queue");
+    running.stop().await
+}
+
+fn announce(running: &Running, json: bool) {
+    let address = format!("http://{}", running.addr);
+    if json {
+        println!("{}", serde_json::json!({"address": address, "admin_key": running.admin_key}));
+        return;
+    }
+    println!("Surefoot listens on {address}");
+    println!("API documentation:  {address}/docs");
+    if let Some(key) = &running.admin_key {
+        println!();
+        println!("Admin key, shown this once: {key}");
+    }
+}
+
+/// Waits for the signal to end.
+async fn ended() -> anyhow::Result<()> {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        let mut terminate = signal(SignalKind::terminate())?;
+        tokio::select! {
+            interrupted = tokio::signal::ctrl_c() => interrupted?,
+            _ = terminate.recv() => {}
+        }
+    }
+    #[cfg(not(unix))]
+    tokio::signal::ctrl_c().await?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn environment(pairs: &[(&str, &str)]) -> HashMap<String, String> {
+        pairs.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect()
+    }
+
+    #[test]
+    fn without_any_source_the_defaults_hold() {
+        assert_eq!(config_of_sources(None, HashMap::new()).unwrap(), Config::default());
+    }
+
+    #[test]
+    fn the_environment_wins_over_the_file_and_foreign_variables_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("any.toml");
+        std::fs::write(&file, "workers = 7\nlisten = \"0.0.0.0:9000\"\n").unwrap();
+        let set = environment(&[("SUREFOOT_WORKERS", "3"), ("SUREFOOT_DATA", "/elsewhere"), ("PATH", "/bin")]);
+        let config = config_of_sources(Some(&file), set).unwrap();
+        assert_eq!((config.workers, config.listen.port()), (3, 9000));
+        assert_eq!(config.data_dir, Config::default().data_dir);
+    }
+
+    #[test]
+    fn a_misspelt_setting_in_the_file_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("any.toml");
+        std::fs::write(&file, "wrokers = 7\n").unwrap();
+        let error = format!("{:#}", config_of_sources(Some(&file), HashMap::new()).unwrap_err());
+        assert!(error.contains("wrokers"), "{error}");
+    }
+}
