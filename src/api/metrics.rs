@@ -20,7 +20,8 @@ pub const UPLOAD_BYTES: &str = "surefoot_upload_bytes_total";
 pub const JOBS: &str = "surefoot_jobs";
 
 /// Upper bounds of the buckets of every time, seconds: from a small read to a long assessment.
-const TIME_BUCKETS: [f64; 14] = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0, 120.0];
+const TIME_BUCKETS: [f64; 14] =
+    [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0, 120.0];
 
 static INSTALLED: Mutex<Option<PrometheusHandle>> = Mutex::new(None);
 

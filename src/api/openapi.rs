@@ -137,7 +137,8 @@ fn merge_tagged_variants(schema: &mut Value, schemas: &Value) {
 
 /// A field that may be absent has no default to be told of, least of all one that its own type does not allow.
 fn drop_null_defaults(schema: &mut Value) {
-    for property in schema.get_mut("properties").and_then(Value::as_object_mut).into_iter().flat_map(|p| p.values_mut()) {
+    for property in schema.get_mut("properties").and_then(Value::as_object_mut).into_iter().flat_map(|p| p.values_mut())
+    {
         if property.get("default").is_some_and(Value::is_null)
             && let Some(property) = property.as_object_mut()
         {

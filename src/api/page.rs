@@ -103,7 +103,8 @@ mod tests {
     fn the_link_to_the_next_page_repeats_the_filters_that_are_set() {
         let last = Uuid::from_u128(7);
         let link = PageLink::new("/v1/jobs", 2, &[("state", Some("failed".into())), ("session_id", None)]);
-        let page = Page::from_stored(Stored { items: vec![1, 2], next: Some(last) }, &link, |id| id, |row: i32| row * 10);
+        let page =
+            Page::from_stored(Stored { items: vec![1, 2], next: Some(last) }, &link, |id| id, |row: i32| row * 10);
         assert_eq!(page.items, [10, 20]);
         assert_eq!(page.next.unwrap(), format!("/v1/jobs?limit=2&state=failed&cursor={}", cursor_from_id(last)));
         let page = Page::from_stored(Stored { items: vec![1], next: None::<Uuid> }, &link, |id| id, |row: i32| row);

@@ -35,10 +35,7 @@ const MAX_SEED: u64 = (1 << 53) - 1;
 
 /// Ordinary routes of this file.
 pub fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new()
-        .routes(routes!(list_recordings))
-        .routes(routes!(read_recording))
-        .routes(routes!(create_job))
+    OpenApiRouter::new().routes(routes!(list_recordings)).routes(routes!(read_recording)).routes(routes!(create_job))
 }
 
 /// The route whose answer lasts as long as the client reads.

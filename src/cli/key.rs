@@ -1,7 +1,7 @@
 //! `surefoot key`: API keys, made and revoked at the machine itself.
 
 use super::serve;
-use crate::storage::{Client, ClientId, OrganisationId, Role, Store, StorageError};
+use crate::storage::{Client, ClientId, OrganisationId, Role, StorageError, Store};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
 use uuid::Uuid;
@@ -88,13 +88,7 @@ pub async fn run(args: &Args) -> anyhow::Result<()> {
     result
 }
 
-async fn create(
-    store: &Store,
-    role: Role,
-    label: &str,
-    organisation: Option<&str>,
-    json: bool,
-) -> anyhow::Result<()> {
+async fn create(store: &Store, role: Role, label: &str, organisation: Option<&str>, json: bool) -> anyhow::Result<()> {
     if label.is_empty() || label.chars().count() > 64 || label.chars().any(char::is_control) {
         bail!("the label must be one line of 1 to 64 characters");
     }

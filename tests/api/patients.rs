@@ -26,7 +26,10 @@ async fn a_patient_is_made_found_again_and_changed() {
 
     let patch = json!({"height_m": 1.7, "sex": null});
     let changed = app.request(Method::PATCH, location).json(&patch).send().await.expect(StatusCode::OK);
-    assert_eq!((&changed["height_m"], &changed["sex"], &changed["birth_year"]), (&json!(1.7), &Value::Null, &json!(1948)));
+    assert_eq!(
+        (&changed["height_m"], &changed["sex"], &changed["birth_year"]),
+        (&json!(1.7), &Value::Null, &json!(1948))
+    );
     assert_eq!(app.get(location).send().await.expect(StatusCode::OK), changed);
 }
 

@@ -81,9 +81,8 @@ async fn a_digest_that_matches_is_accepted_in_both_spellings() {
 async fn the_same_upload_under_one_key_is_stored_once_and_answered_alike() {
     let app = TestApp::new().await;
     let path = format!("/v1/sessions/{}/recordings", app.session().await);
-    let upload = |bytes: Vec<u8>| {
-        app.post(&path).header("idempotency-key", "kit-7:0001").body("application/json", bytes).send()
-    };
+    let upload =
+        |bytes: Vec<u8>| app.post(&path).header("idempotency-key", "kit-7:0001").body("application/json", bytes).send();
     let first = upload(samples::json_recording()).await;
     let second = upload(samples::json_recording()).await;
     assert_eq!(first.expect(StatusCode::ACCEPTED), second.expect(StatusCode::ACCEPTED));

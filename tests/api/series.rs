@@ -20,7 +20,10 @@ async fn all_channels_come_with_interval_and_flags_and_null_for_no_number() {
     for part in ["value", "low", "high", "flags"] {
         assert_eq!(knee[part].as_array().unwrap().len(), KNOWN_SAMPLES, "{part}");
     }
-    assert_eq!((&knee["value"][1234], &knee["low"][1234], &knee["high"][1234]), (&json!(12.34), &json!(10.84), &json!(13.84)));
+    assert_eq!(
+        (&knee["value"][1234], &knee["low"][1234], &knee["high"][1234]),
+        (&json!(12.34), &json!(10.84), &json!(13.84))
+    );
     assert_eq!((&trunk["value"][10], &trunk["flags"][10]), (&Value::Null, &json!(2)));
     assert_eq!((&trunk["value"][11], &trunk["low"][11]), (&json!(3), &Value::Null));
     assert_eq!(series["flag_names"][1], "not_observable");

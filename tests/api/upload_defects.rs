@@ -158,9 +158,8 @@ async fn an_announced_length_beyond_the_limit_is_refused_before_any_byte() {
     let app = TestApp::new().await;
     let path = format!("/v1/sessions/{}/recordings", app.session().await);
     // A body that panics when it is looked at.
-    let untouched = stream::poll_fn(|_| -> std::task::Poll<Option<Result<Bytes, std::io::Error>>> {
-        panic!("the body was read")
-    });
+    let untouched =
+        stream::poll_fn(|_| -> std::task::Poll<Option<Result<Bytes, std::io::Error>>> { panic!("the body was read") });
     let upload = app.post(&path).header("content-length", "2147483648");
     let answer = upload.body("application/mcap", Body::from_stream(untouched)).send().await;
     nothing_stays(&app, &path, &answer, 413, "too_large").await;

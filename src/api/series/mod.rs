@@ -206,14 +206,17 @@ fn channels(parameters: &SeriesParameters, known: &[String]) -> Result<Option<Ve
         }
     }
     if let Some(joint) = &parameters.joint {
-        let of_joint = known.iter().filter(|channel| {
-            channel.strip_prefix(joint.as_str()).is_some_and(|rest| rest.starts_with('_'))
-        });
+        let of_joint = known
+            .iter()
+            .filter(|channel| channel.strip_prefix(joint.as_str()).is_some_and(|rest| rest.starts_with('_')));
         let before = wanted.len();
         let new: Vec<String> = of_joint.filter(|channel| !wanted.contains(channel)).cloned().collect();
         wanted.extend(new);
         if wanted.len() == before && parameters.channels.is_none() {
-            errors.push(FieldError::new("joint", format!("no channel belongs to `{joint}`; see the channels: {}", known.join(", "))));
+            errors.push(FieldError::new(
+                "joint",
+                format!("no channel belongs to `{joint}`; see the channels: {}", known.join(", ")),
+            ));
         }
     }
     if errors.is_empty() { Ok(Some(wanted)) } else { Err(ApiError::InvalidRequest(errors)) }

@@ -205,8 +205,7 @@ mod tests {
         series.value = vec![1.5, f32::NAN];
         let slice = SeriesSlice { time_ns: vec![0, 1_000_000], series: vec![series], n_in_range: 2 };
         let name = "left_knee_flexion_deg";
-        let expected =
-            format!("time_s,{name},{name}_low,{name}_high,{name}_flags\r\n0,1.5,,,0\r\n0.001,,,,0\r\n");
+        let expected = format!("time_s,{name},{name}_low,{name}_high,{name}_flags\r\n0,1.5,,,0\r\n0.001,,,,0\r\n");
         assert_eq!(String::from_utf8(csv(&slice)).unwrap(), expected);
     }
 
