@@ -133,14 +133,14 @@ CREATE TABLE series_chunks (
     PRIMARY KEY (assessment_id, channel, chunk)
 ) STRICT;
 
--- A request that may be sent twice. While `status` is null the first one is still at work, until `expires_at`.
+-- The answers to requests that may be sent twice, kept until `expires_at`.
 CREATE TABLE idempotency_keys (
     client_id BLOB NOT NULL REFERENCES clients (id),
     key TEXT NOT NULL,
     fingerprint TEXT NOT NULL,
-    status INTEGER,
-    headers TEXT,
-    body BLOB,
+    status INTEGER NOT NULL,
+    headers TEXT NOT NULL,
+    body BLOB NOT NULL,
     created_at INTEGER NOT NULL,
     expires_at INTEGER NOT NULL,
     PRIMARY KEY (client_id, key)

@@ -4,8 +4,22 @@ use super::job::job_from_row;
 use super::{Job, Queue};
 use crate::assessment::Settings;
 use crate::storage::clock::ms_from_time;
-use crate::storage::{Access, JobId, NewRecording, RecordingId, StorageError, StoredRecording, recordings, row};
+use crate::storage::idempotency::{KeptAnswer, keep_answer, kept_answer};
+use crate::storage::{
+    Access, JobId, NewRecording, RecordingId, StorageError, StoredRecording, StoredResponse, recordings, row,
+};
 use sqlx::SqliteConnection;
+
+/// What became of an upload that may have been sent before.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Submission {
+    /// It is stored, and this is the answer.
+    Stored(StoredResponse),
+    /// It was stored before, and this was the answer.
+    Replayed(StoredResponse),
+    /// The key belongs to an upload of another content; nothing was stored.
+    KeyReused,
+}
 
 impl Queue {
     /// Stores a recording and the job to assess it, both or neither, and wakes a worker.
@@ -25,6 +39,40 @@ impl Queue {
         self.wake.notify_one();
         self.announce(job.id);
         Ok((recording, job))
+    }
+
+    /// Like [`Queue::submit`], once per `key` of the client: recording, job and the `answer` made of them are stored
+    /// together, and whoever brings the key again gets that answer. `fingerprint` stands for the content of the
+    /// request.
+    ///
+    /// # Errors
+    /// `NotFound` (`session`) when the session is out of the caller's reach.
+    pub async fn submit_once(
+        &self,
+        access: &Access,
+        key: &str,
+        fingerprint: String,
+        new: &NewRecording,
+        settings: &Settings,
+        answer: impl FnOnce(StoredRecording, Job) -> serde_json::Result<StoredResponse>,
+    ) -> Result<Submission, StorageError> {
+        let now = self.store.now();
+        let mut transaction = self.store.begin().await?;
+        if let Some(kept) = kept_answer(&mut transaction, access.client, key, now).await? {
+            let same = kept.fingerprint == fingerprint;
+            return Ok(if same { Submission::Replayed(kept.response) } else { Submission::KeyReused });
+        }
+        let recording = recordings::insert(&mut transaction, access, new, now).await?;
+        let job = self.insert(&mut transaction, access, recording.id, settings).await?;
+        let id = job.id;
+        let unwritable = |error| StorageError::Corrupt(format!("an answer cannot be written: {error}"));
+        let response = answer(recording, job).map_err(unwritable)?;
+        let kept = KeptAnswer { fingerprint, response };
+        keep_answer(&mut transaction, access.client, key, &kept, now).await?;
+        transaction.commit().await?;
+        self.wake.notify_one();
+        self.announce(id);
+        Ok(Submission::Stored(kept.response))
     }
 
     /// Asks for another assessment of a recording that is already stored.

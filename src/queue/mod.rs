@@ -24,6 +24,7 @@ mod job;
 mod questions;
 
 pub use claiming::Renewal;
+pub use enqueueing::Submission;
 pub use finishing::{Failure, Finish};
 pub use job::{Job, JobError, JobFilter, JobState};
 

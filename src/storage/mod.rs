@@ -35,7 +35,7 @@ pub use clients::{ApiKey, Client, Role};
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use error::StorageError;
 pub use id::{AssessmentId, ClientId, JobId, OrganisationId, PatientId, RecordingId, SessionId};
-pub use idempotency::{IdempotencyClaim, StoredResponse};
+pub use idempotency::StoredResponse;
 pub use organisations::Organisation;
 pub use page::{Page, PageRequest};
 pub use patients::{NewPatient, Patient, PatientFilter, Sex};

@@ -266,34 +266,3 @@ async fn a_device_sees_its_own_sessions_and_what_hangs_on_them_only() {
     let of_patient = RecordingFilter { patient_id: Some(clinic.patient), ..all };
     assert_eq!(list(&clinic.admin, of_patient).await, [recording.id, theirs.id]);
 }
-
-#[tokio::test]
-async fn a_repeated_request_gets_the_first_answer_and_another_one_is_told_apart() {
-    let clinic = Clinic::open().await;
-    let (store, client) = (&clinic.store, clinic.device.client);
-    let claim = async |fingerprint: &str| store.claim_idempotency_key(client, "key", fingerprint).await.unwrap();
-    assert_eq!(claim("a").await, IdempotencyClaim::Fresh);
-    assert_eq!(claim("a").await, IdempotencyClaim::InProgress);
-    assert_eq!(claim("b").await, IdempotencyClaim::Mismatch);
-    let response =
-        StoredResponse { status: 202, headers: vec![("location".into(), "/v1/jobs/1".into())], body: b"{}".to_vec() };
-    store.complete_idempotency_key(client, "key", &response).await.unwrap();
-    assert_eq!(claim("a").await, IdempotencyClaim::Replay(response));
-    assert_eq!(claim("b").await, IdempotencyClaim::Mismatch);
-    let other = store.claim_idempotency_key(clinic.admin.client, "key", "b").await.unwrap();
-    assert_eq!(other, IdempotencyClaim::Fresh, "another client's key");
-    clinic.clock.advance(time::Duration::hours(24));
-    assert_eq!(claim("b").await, IdempotencyClaim::Fresh);
-}
-
-#[tokio::test]
-async fn a_key_is_free_again_after_a_failure_or_when_its_request_was_lost() {
-    let clinic = Clinic::open().await;
-    let (store, client) = (&clinic.store, clinic.device.client);
-    let claim = async || store.claim_idempotency_key(client, "key", "a").await.unwrap();
-    assert_eq!(claim().await, IdempotencyClaim::Fresh);
-    store.release_idempotency_key(client, "key").await.unwrap();
-    assert_eq!(claim().await, IdempotencyClaim::Fresh);
-    clinic.clock.advance(time::Duration::seconds(60));
-    assert_eq!(claim().await, IdempotencyClaim::Fresh);
-}

@@ -2,9 +2,13 @@
 
 use crate::support::{Bench, assessment, open, side_door};
 use std::collections::{BTreeSet, HashSet};
+use std::sync::Arc;
+use surefoot::assessment::Settings;
 use surefoot::progress::{Progress, Step};
-use surefoot::queue::{Failure, Finish, JobError, JobFilter, JobState, Renewal, WORKER_LOST};
-use surefoot::storage::{AssessmentFilter, PageRequest, SeriesQuery, StorageError};
+use surefoot::queue::{Failure, Finish, Job, JobError, JobFilter, JobState, Renewal, Submission, WORKER_LOST};
+use surefoot::storage::{
+    Access, AssessmentFilter, PageRequest, Role, SeriesQuery, StorageError, StoredRecording, StoredResponse,
+};
 use time::Duration;
 
 const PROGRESS: Progress = Progress { step: Step::Estimating, done: 7, total: 10 };
@@ -255,4 +259,57 @@ async fn jobs_are_listed_newest_first_in_pages_and_by_state_and_recording() {
     assert_eq!(list(of_second, PageRequest::first(9)).await.0, [third.id, second.id]);
     let states: BTreeSet<_> = bench.queue.counts().await.unwrap().into_iter().map(|(s, n)| (s.name(), n)).collect();
     assert_eq!(states, BTreeSet::from([("queued", 2), ("running", 1)]));
+}
+
+fn answer(_: StoredRecording, job: Job) -> serde_json::Result<StoredResponse> {
+    Ok(StoredResponse { status: 202, headers: vec![("location".into(), job.id.to_string())], body: b"{}".to_vec() })
+}
+
+#[tokio::test]
+async fn an_upload_that_is_sent_twice_is_stored_once_and_answered_twice() {
+    let bench = Bench::new().await;
+    let (new, settings) = (bench.new_recording(b"abc").await, Settings::default());
+    let submit = async |access: &Access, fingerprint: &str| {
+        bench.queue.submit_once(access, "key", fingerprint.into(), &new, &settings, answer).await.unwrap()
+    };
+    let Submission::Stored(first) = submit(&bench.access, "a").await else { panic!("not stored") };
+    assert_eq!(submit(&bench.access, "a").await, Submission::Replayed(first));
+    assert_eq!(submit(&bench.access, "b").await, Submission::KeyReused);
+    assert_eq!(bench.queue.counts().await.unwrap(), [(JobState::Queued, 1)]);
+    let (other, _) = bench.queue.store().create_client(bench.access.organisation, Role::Admin, "other").await.unwrap();
+    assert!(matches!(submit(&other.access(), "b").await, Submission::Stored(_)), "another client's key");
+    bench.clock.advance(Duration::hours(24));
+    assert!(matches!(submit(&bench.access, "b").await, Submission::Stored(_)), "the key is forgotten after a day");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn of_many_equal_uploads_at_the_same_time_one_is_stored() {
+    let bench = Arc::new(Bench::new().await);
+    let mut uploads = tokio::task::JoinSet::new();
+    for _ in 0..16 {
+        let bench = bench.clone();
+        uploads.spawn(async move {
+            let (new, settings) = (bench.new_recording(b"abc").await, Settings::default());
+            bench.queue.submit_once(&bench.access, "key", "a".into(), &new, &settings, answer).await.unwrap()
+        });
+    }
+    let outcomes = uploads.join_all().await;
+    assert_eq!(outcomes.iter().filter(|o| matches!(o, Submission::Stored(_))).count(), 1);
+    assert_eq!(outcomes.iter().filter(|o| matches!(o, Submission::Replayed(_))).count(), 15);
+}
+
+#[tokio::test]
+async fn an_upload_whose_answer_cannot_be_kept_is_not_stored_and_its_key_is_free() {
+    let bench = Bench::new().await;
+    let (new, settings) = (bench.new_recording(b"abc").await, Settings::default());
+    let rows = side_door(bench.dir.path()).await;
+    let submit = async || bench.queue.submit_once(&bench.access, "key", "a".into(), &new, &settings, answer).await;
+    sqlx::raw_sql("CREATE TRIGGER fault BEFORE INSERT ON idempotency_keys BEGIN SELECT RAISE(ABORT, 'injected'); END")
+        .execute(&rows)
+        .await
+        .unwrap();
+    assert!(matches!(submit().await, Err(StorageError::Database(_))));
+    assert_eq!(bench.queue.counts().await.unwrap(), []);
+    sqlx::raw_sql("DROP TRIGGER fault").execute(&rows).await.unwrap();
+    assert!(matches!(submit().await.unwrap(), Submission::Stored(_)));
 }

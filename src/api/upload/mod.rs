@@ -7,14 +7,15 @@ mod announced;
 mod arrival;
 
 use super::auth::Caller;
-use super::error::{ApiError, Problem};
+use super::error::ApiError;
 use super::jobs::JobResponse;
 use super::recordings::RecordingResponse;
 use super::request::ApiPath;
 use super::sessions::SessionPath;
 use super::state::AppState;
 use crate::assessment::Settings;
-use crate::storage::{ClientId, IdempotencyClaim, NewRecording, SessionId, StoredResponse};
+use crate::queue::{Job, Submission};
+use crate::storage::{NewRecording, SessionId, StoredRecording, StoredResponse};
 use announced::Announced;
 use arrival::Arrived;
 use axum::body::Body;
@@ -64,9 +65,7 @@ pub struct UploadResponse {
     request_body(description = "The recording", content(
         (Vec<u8> = "application/mcap"), (Vec<u8> = "application/octet-stream"), (Object = "application/json"))),
     responses((status = 202, description = "Stored; Location says where its job lives", body = UploadResponse,
-                headers(("Location" = String, description = "Address of the job"))),
-              (status = 409, description = "The same upload is being received at this moment", body = Problem,
-               content_type = "application/problem+json")))]
+                headers(("Location" = String, description = "Address of the job")))))]
 async fn upload_recording(
     State(state): State<AppState>,
     caller: Caller,
@@ -79,29 +78,18 @@ async fn upload_recording(
     let arrived = arrival::receive(&state, &announced, body).await?;
     announced.check_digest(arrived.sealed.sha256())?;
 
-    let Some(key) = &announced.idempotency_key else {
-        return Ok(response(&store(&state, &caller, session.id, arrived).await?));
-    };
-    let client = caller.client.id;
     let fingerprint = fingerprint(session.id, &arrived);
-    match state.store.claim_idempotency_key(client, key, &fingerprint).await? {
-        IdempotencyClaim::Fresh => {}
-        IdempotencyClaim::Replay(answer) => return Ok(replayed(&answer)),
-        IdempotencyClaim::Mismatch => return Err(ApiError::IdempotencyKeyReused),
-        IdempotencyClaim::InProgress => {
-            let detail = "The same upload is being received at this moment. Wait a second and send it again.";
-            return Err(ApiError::Conflict("request_in_progress", detail.into()));
-        }
-    }
-    match store(&state, &caller, session.id, arrived).await {
-        Ok(answer) => {
-            remember(&state, client, key, &answer).await;
-            Ok(response(&answer))
-        }
-        Err(error) => {
-            state.store.release_idempotency_key(client, key).await?;
-            Err(error)
-        }
+    let settings = Settings::default();
+    let blob = arrived.sealed.keep().await?;
+    let new = NewRecording { session_id: session.id, blob, inspection: arrived.inspection };
+    let Some(key) = &announced.idempotency_key else {
+        let (recording, job) = state.queue.submit(&caller.access, &new, &settings).await?;
+        return Ok(response(&answer(recording, job).map_err(ApiError::internal)?));
+    };
+    match state.queue.submit_once(&caller.access, key, fingerprint, &new, &settings, answer).await? {
+        Submission::Stored(answer) => Ok(response(&answer)),
+        Submission::Replayed(answer) => Ok(replayed(&answer)),
+        Submission::KeyReused => Err(ApiError::IdempotencyKeyReused),
     }
 }
 
@@ -114,31 +102,15 @@ fn fingerprint(session: SessionId, arrived: &Arrived) -> String {
     hex::encode(hash.finalize())
 }
 
-/// Keeps the bytes, then makes recording and job in one transaction; the answer is what the client gets.
-async fn store(
-    state: &AppState,
-    caller: &Caller,
-    session_id: SessionId,
-    arrived: Arrived,
-) -> Result<StoredResponse, ApiError> {
-    let blob = arrived.sealed.keep().await?;
-    let new = NewRecording { session_id, blob, inspection: arrived.inspection };
-    let (recording, job) = state.queue.submit(&caller.access, &new, &Settings::default()).await?;
+/// What the client gets; kept for a repeated request.
+fn answer(recording: StoredRecording, job: Job) -> serde_json::Result<StoredResponse> {
     let location = format!("/v1/jobs/{}", job.id);
     let body = UploadResponse { recording: recording.into(), job: job.into() };
     Ok(StoredResponse {
         status: StatusCode::ACCEPTED.as_u16(),
         headers: vec![(header::LOCATION.to_string(), location)],
-        body: serde_json::to_vec(&body).map_err(ApiError::internal)?,
+        body: serde_json::to_vec(&body)?,
     })
-}
-
-/// Keeps the answer for a repeated request. The recording is stored already: a failure here is no reason to tell the
-/// client otherwise.
-async fn remember(state: &AppState, client: ClientId, key: &str, answer: &StoredResponse) {
-    if let Err(error) = state.store.complete_idempotency_key(client, key, answer).await {
-        tracing::error!(error = format!("{error:#}"), "the answer to an upload could not be kept for a repetition");
-    }
 }
 
 fn response(answer: &StoredResponse) -> Response {
