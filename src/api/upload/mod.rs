@@ -57,7 +57,7 @@ pub struct UploadResponse {
 #[utoipa::path(post, path = "/v1/sessions/{id}/recordings", tag = "recordings", operation_id = "upload_recording",
     params(SessionPath,
         ("Content-Digest" = Option<String>, Header, description = "SHA-256 of the body (RFC 9530)",
-            pattern = "^sha-256=:[A-Za-z0-9+/]{42}[AEIMQUYcgkosw048]=:$"),
+            pattern = "^(sha-256=:[A-Za-z0-9+/]{42}[AEIMQUYcgkosw048]=:)?$"),
         ("X-Content-SHA256" = Option<String>, Header, description = "SHA-256 of the body, hexadecimal",
             pattern = "^[0-9a-fA-F]{64}$"),
         ("Idempotency-Key" = Option<String>, Header, description = "Name of this upload, chosen by the client; the \
