@@ -8,7 +8,10 @@ use std::fs;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
-/// Arguments of `surefoot import`.
+/// Make recordings of a public data set
+///
+/// Reads the original files and writes one recording per trial, with the data set's reference on its own channels, and a
+/// report of what had to be repaired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Example: surefoot import uiprmd ~/data/skeleton recordings/
