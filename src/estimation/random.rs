@@ -50,18 +50,31 @@ impl RandomStreams {
         let drawn = groups.next_multiple_of(2) * LANES;
         self.bits.resize(4 * drawn, 0);
         self.rng.fill_bytes(&mut self.bits);
-        let bits = &self.bits;
-        self.arch.dispatch(|| {
-            for (pair, bits) in bits.chunks_exact(8 * LANES).enumerate() {
-                let (u, v) = bits.split_at(4 * LANES);
-                let (a, b) = normal_pair(&uniform_lanes(u), &uniform_lanes(v));
-                let start = 2 * pair * LANES;
-                out[start..start + LANES].copy_from_slice(&a);
-                if let Some(second) = out.get_mut(start + LANES..start + 2 * LANES) {
-                    second.copy_from_slice(&b);
-                }
+        self.arch.dispatch(BoxMuller { bits: &self.bits, out });
+    }
+}
+
+/// The transform of all drawn bits, to be compiled for each instruction set (a closure is not compiled into the function
+/// that has the instruction set's features).
+struct BoxMuller<'a> {
+    bits: &'a [u8],
+    out: &'a mut [f32],
+}
+
+impl pulp::NullaryFnOnce for BoxMuller<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (pair, bits) in self.bits.chunks_exact(8 * LANES).enumerate() {
+            let (u, v) = bits.split_at(4 * LANES);
+            let (a, b) = normal_pair(&uniform_lanes(u), &uniform_lanes(v));
+            let start = 2 * pair * LANES;
+            self.out[start..start + LANES].copy_from_slice(&a);
+            if let Some(second) = self.out.get_mut(start + LANES..start + 2 * LANES) {
+                second.copy_from_slice(&b);
             }
-        });
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use crate::assessment::Warning;
 use crate::assessment::quality::{CalibrationQuality, SegmentLength};
 use crate::body::skeleton::point_index;
 use crate::body::{Limb, POINT_COUNT, Skeleton};
+use crate::geometry::three_point::flexion_of_three_points;
 use crate::pipeline::PipelineError;
 use crate::signal::stillness::stillest_window;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -19,6 +20,8 @@ const MIN_WINDOW_S: f64 = 1.0;
 const SEARCH_S: f64 = 5.0;
 /// Mean drift of the points under which a window is static, m/s; a slow exercise moves a hand ten times as fast.
 const STILL_BELOW: f64 = 0.03;
+/// Knee flexion under which a leg counts as straight, radians (30°): a static window must show straight legs.
+const STRAIGHT_BELOW_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Frames that a calibration needs at the least.
 const MIN_FRAMES: usize = 5;
 /// Segment lengths that a human body can have, metres; outside them the unit or the joints must be wrong.
@@ -44,7 +47,8 @@ pub fn calibrate(observations: &mut Observations) -> Result<Calibration, Pipelin
     let whole = 0..observations.len();
     let window = stillest_window(&observations.time_ns, &observations.points, MIN_WINDOW_S, SEARCH_S)
         .filter(|window| window.drift < STILL_BELOW)
-        .filter(|window| complete_frames(observations, window.frames.clone()).len() >= MIN_FRAMES);
+        .filter(|window| complete_frames(observations, window.frames.clone()).len() >= MIN_FRAMES)
+        .filter(|window| shows_straight_legs(observations, window.frames.clone()));
     let frames = complete_frames(observations, window.as_ref().map_or(whole, |w| w.frames.clone()));
     if frames.len() < MIN_FRAMES {
         let sentence = format!(
@@ -84,6 +88,16 @@ fn complete_frames(observations: &Observations, range: Range<usize>) -> Vec<usiz
     range.filter(|t| observations.points[*t].iter().all(|p| p.x.is_finite())).collect()
 }
 
+/// True when both knees are nearly straight in the median posture of a window. A subject who holds a bent posture rests
+/// too, but sensors foreshorten bent segments, and lengths taken there would be wrong everywhere else.
+fn shows_straight_legs(observations: &Observations, range: Range<usize>) -> bool {
+    let rest = median_points(observations, &complete_frames(observations, range));
+    [Limb::LeftLeg, Limb::RightLeg].iter().all(|limb| {
+        let at = |level| &rest[point_index(*limb, level)];
+        flexion_of_three_points(at(0), at(1), at(2)) < STRAIGHT_BELOW_RAD
+    })
+}
+
 /// Turn about the vertical that brings the subject's mean right-hand direction to +Z.
 fn subject_from_world(observations: &Observations, frames: &[usize]) -> Rotation3<f64> {
     let rightward: Vector3<f64> = frames.iter().map(|t| rightward(&observations.points[*t])).sum();
@@ -108,10 +122,7 @@ fn trunk_axes(points: &[Vector3<f64>; POINT_COUNT]) -> Option<Rotation3<f64>> {
 
 /// Lengths of the median posture of a resting subject: averaging positions first leaves no bias of noise in lengths.
 fn measure_static(observations: &Observations, frames: &[usize]) -> (Skeleton, Vec<SegmentLength>) {
-    let mut rest = [Vector3::zeros(); POINT_COUNT];
-    for (p, point) in rest.iter_mut().enumerate() {
-        *point = median_vector(frames.iter().map(|t| observations.points[*t][p]));
-    }
+    let rest = median_points(observations, frames);
     let axes = trunk_axes(&rest).unwrap_or_else(Rotation3::identity);
     let offsets = Limb::ALL.map(|limb| axes.inverse() * rest[point_index(limb, 0)]);
     let (_, segments) = measure_moving(observations, frames);
@@ -220,6 +231,11 @@ fn median(values: &mut [f64]) -> f64 {
     }
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Median position of each point over frames.
+fn median_points(observations: &Observations, frames: &[usize]) -> [Vector3<f64>; POINT_COUNT] {
+    std::array::from_fn(|p| median_vector(frames.iter().map(|t| observations.points[*t][p])))
 }
 
 fn median_vector(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {

@@ -76,6 +76,14 @@ impl Observations {
         if t == 0 { 0.0 } else { (self.time_ns[t] - self.time_ns[t - 1]) as f64 * 1e-9 }
     }
 
+    /// Time from the first to the last frame, seconds.
+    pub fn duration_s(&self) -> f64 {
+        match (self.time_ns.first(), self.time_ns.last()) {
+            (Some(first), Some(last)) => (last - first) as f64 * 1e-9,
+            _ => 0.0,
+        }
+    }
+
     /// Points seen in frame `t`.
     pub fn seen(&self, t: usize) -> SeenMask {
         seen_mask(&self.points[t])

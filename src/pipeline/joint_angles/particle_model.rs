@@ -106,14 +106,32 @@ impl ParticleModel for SkeletonParticleModel {
         let whitening = self.whitenings.entry(mask).or_insert_with(|| Whitening::new(observation, mask));
         let observed = points.map(|p| [p.x as f32, p.y as f32, p.z as f32]);
         let kernel = &self.kernel;
-        self.arch.dispatch(|| {
-            for (group, out) in log_likelihood.chunks_exact_mut(LANES).enumerate() {
-                let distances = kernel.squared_mahalanobis(particles, group * LANES, &observed, whitening);
-                for (log, distance) in out.iter_mut().zip(distances) {
-                    *log = -0.5 * f64::from(distance);
-                }
+        self.arch.dispatch(LikelihoodTask { kernel, particles, observed, whitening, log_likelihood });
+    }
+}
+
+/// The likelihood of all particles, to be compiled for each instruction set. A closure would not do: it is not
+/// compiled into the function that has the instruction set's features.
+struct LikelihoodTask<'a> {
+    kernel: &'a Kernel,
+    particles: &'a Particles,
+    observed: [[f32; 3]; POINT_COUNT],
+    whitening: &'a Whitening,
+    log_likelihood: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for LikelihoodTask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (group, out) in self.log_likelihood.chunks_exact_mut(LANES).enumerate() {
+            let distances =
+                self.kernel.squared_mahalanobis(self.particles, group * LANES, &self.observed, self.whitening);
+            for (log, distance) in out.iter_mut().zip(distances) {
+                *log = -0.5 * f64::from(distance);
             }
-        });
+        }
     }
 }
 

@@ -2,15 +2,16 @@
 //! and a backward pass over the whole recording.
 //!
 //! What joint centres cannot show, the twist of a straight limb, is held by a weak prior at zero twist
-//! ([`Tuning::twist_sd`]); its interval then says how little is known.
+//! ([`Tuning::twist_sd`]). Two errors make the interval: white noise, which the passes average, and the sensor's slow
+//! offset, which stays as long as the posture does and is carried into the angles by one frame's geometry.
 
 use super::calibration::Calibration;
 use super::inverse_kinematics::pose_from_points;
 use super::observation::{ALL_SEEN, Observations};
 use super::posterior::{PoseCovariance, Posterior};
-use super::sensor_noise::white_noise;
+use super::sensor_noise::{slow_offset, white_noise};
 use crate::assessment::series::FLAG_OUTLIER;
-use crate::body::kinematics::forward_kinematics;
+use crate::body::kinematics::{forward_kinematics, forward_kinematics_with_jacobian};
 use crate::body::pose::{POSE_DIMENSION, PoseVector, attitude_offset, hinge_offset};
 use crate::body::skeleton::point_index;
 use crate::body::{Limb, POINT_COUNT, Pose, Skeleton};
@@ -22,15 +23,17 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 /// What can be tuned, each with the measurement that set it in `docs/measurements.md`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuning {
-    /// Error of a point that is not white noise, metres: the slow, posture-dependent offset of a body tracker is 40 to
-    /// 56 mm on the recordings of `methods.md`, of which bones of constant length absorb the larger part.
-    pub model_sd_m: f64,
-    /// Degrees of freedom of the Student-t weight of a point: 4 keeps 95 % of a normal point's weight and takes nearly
-    /// all of it from one that is 5 standard deviations off.
+    /// Least and largest error of a point that the passes count as independent from frame to frame beside its white
+    /// noise, metres. Between the two it is the recording's own slow offset; the bound keeps a bad sensor from losing
+    /// its weight against the dynamics, the floor a perfect one from having infinite weight.
+    pub model_sd: [f64; 2],
+    /// Degrees of freedom of the Student-t weight of a point: with 6 a point that is 5 standard deviations off has a
+    /// fifth of its weight left, one that is 20 off a fiftieth.
     pub student_t_dof: f64,
     /// Standard deviation of the twist of a limb about its own axis, radians.
     pub twist_sd: f64,
-    /// Time over which the twist prior counts once, seconds.
+    /// Time over which the twist prior counts once, seconds. One frame: a sensor's offset repeats itself in every frame
+    /// too, so a prior that counted less often would lose against an error that never averages out.
     pub twist_time_s: f64,
     /// Spectral density of angular acceleration of the trunk, rad²/s³.
     pub trunk_density: f64,
@@ -43,17 +46,19 @@ pub struct Tuning {
 impl Default for Tuning {
     fn default() -> Self {
         Self {
-            model_sd_m: 0.015,
-            student_t_dof: 4.0,
+            model_sd: [0.005, 0.025],
+            student_t_dof: 6.0,
             twist_sd: 10f64.to_radians(),
-            twist_time_s: 0.5,
-            trunk_density: 10.0,
-            limb_density: 40.0,
+            twist_time_s: 1.0 / 30.0,
+            trunk_density: 3.0,
+            limb_density: 10.0,
             rates: RateSettings { rate_decay_s: 0.7, initial_sd: 0.5, initial_rate_sd: 1.0, iterations: 3 },
         }
     }
 }
 
+/// Standard deviation of a rotation of which nothing is seen, radians (60°).
+const UNSEEN_SD: f64 = std::f64::consts::FRAC_PI_3;
 /// Weight under which a point counts as an outlier of its frame.
 const OUTLIER_WEIGHT: f64 = 0.25;
 
@@ -91,13 +96,17 @@ struct Model<'a> {
     tuning: &'a Tuning,
     /// Inverse variance of each point's coordinates, m⁻².
     precision: [Vector3<f64>; POINT_COUNT],
+    /// Offset of a point's coordinates that no averaging over time takes away, metres.
+    slow_offset: f64,
 }
 
 impl<'a> Model<'a> {
     fn new(observations: &'a Observations, skeleton: &'a Skeleton, tuning: &'a Tuning) -> Self {
-        let model_variance = tuning.model_sd_m.powi(2);
-        let precision = white_noise(observations).map(|white| white.map(|sd| 1.0 / (sd.powi(2) + model_variance)));
-        Self { observations, skeleton, tuning, precision }
+        let white = white_noise(observations);
+        let slow_offset = slow_offset(observations, &white);
+        let model_variance = slow_offset.clamp(tuning.model_sd[0], tuning.model_sd[1]).powi(2);
+        let precision = white.map(|white| white.map(|sd| 1.0 / (sd.powi(2) + model_variance)));
+        Self { observations, skeleton, tuning, precision, slow_offset }
     }
 
     fn initial_pose(&self) -> Pose {
@@ -123,7 +132,31 @@ impl<'a> Model<'a> {
             });
             if is_outlier { FLAG_OUTLIER } else { 0 }
         });
-        Posterior { pose, covariance: Some(covariance), seen: self.observations.seen(t), limb_flags }
+        let covariance = Some(covariance + self.offset_covariance(t, &pose));
+        Posterior { pose, covariance, seen: self.observations.seen(t), limb_flags }
+    }
+}
+
+impl Model<'_> {
+    /// What an offset of the sensor that outlasts the smoothing does to a posture, rad²: the covariance of one frame's
+    /// estimate from points that are each off by [`Model::slow_offset`], with the twist prior.
+    fn offset_covariance(&self, t: usize, pose: &Pose) -> PoseCovariance {
+        let (_, jacobian) = forward_kinematics_with_jacobian(self.skeleton, pose);
+        let seen = self.observations.seen(t);
+        // A joint that is not seen is known to this at most; it also keeps the matrix invertible.
+        let mut information = PoseCovariance::identity() / UNSEEN_SD.powi(2);
+        let precision = 1.0 / self.slow_offset.powi(2).max(1e-8);
+        for p in (0..POINT_COUNT).filter(|p| seen >> p & 1 == 1) {
+            let rows = jacobian.fixed_rows::<3>(3 * p);
+            information.gemm_tr(precision, &rows, &rows, 1.0);
+        }
+        for limb in Limb::ALL {
+            let axis = pose.limbs[limb.index()] * limb.reference_direction() / self.tuning.twist_sd;
+            let a = attitude_offset(limb.index());
+            let mut block = information.fixed_view_mut::<3, 3>(a, a);
+            block += axis * axis.transpose();
+        }
+        information.cholesky().map_or_else(PoseCovariance::zeros, |factor| factor.inverse())
     }
 }
 
@@ -235,7 +268,6 @@ impl Model<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::kinematics::forward_kinematics_with_jacobian;
     use nalgebra::Rotation3;
 
     #[test]
@@ -253,7 +285,8 @@ mod tests {
         for p in 0..POINT_COUNT {
             let rows = jacobian.fixed_rows::<3>(3 * p);
             // At a residual of zero the Student-t weight is (ν + 3) / ν.
-            let precision = Matrix3::from_diagonal(&(model.precision[p] * (7.0 / 4.0)));
+            let weight = (tuning.student_t_dof + 3.0) / tuning.student_t_dof;
+            let precision = Matrix3::from_diagonal(&(model.precision[p] * weight));
             expected += rows.transpose() * precision * rows;
         }
         let difference = information - expected;
