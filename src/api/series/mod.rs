@@ -1,5 +1,6 @@
 //! Series of an assessment: chosen channels and times, thinned out when asked, as JSON or CSV.
 
+mod number;
 mod write;
 
 use super::auth::Caller;
