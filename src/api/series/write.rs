@@ -1,7 +1,7 @@
 //! Samples to text. An assessment of ten minutes has a million numbers, so they go straight into one buffer.
 
 use super::flag_names;
-use super::number::{Decimals, number, small_integer, time};
+use super::number::{Decimals, end_list, list, number, small_integer, time};
 use crate::assessment::Series;
 use crate::storage::{SeriesSlice, StoredAssessment};
 
@@ -41,11 +41,7 @@ fn channel(out: &mut Vec<u8>, series: &Series, n: usize) {
             out.extend_from_slice(b",\"");
             out.extend_from_slice(name.as_bytes());
             out.extend_from_slice(b"\":");
-            array(out, numbers, |out, v| {
-                if !number(out, *v, decimals) {
-                    out.extend_from_slice(b"null");
-                }
-            });
+            list(out, numbers, decimals);
         }
     }
     if series.flags.len() == n {
@@ -103,13 +99,11 @@ fn decimals(channel: &str) -> Decimals {
 
 fn array<T>(out: &mut Vec<u8>, items: &[T], mut item: impl FnMut(&mut Vec<u8>, &T)) {
     out.push(b'[');
-    for (i, value) in items.iter().enumerate() {
-        if i > 0 {
-            out.push(b',');
-        }
+    for value in items {
         item(out, value);
+        out.push(b',');
     }
-    out.push(b']');
+    end_list(out);
 }
 
 #[cfg(test)]
