@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 
+from send import Load
 from service import Service, simulate
 
 BINARY = os.path.abspath(sys.argv[1])
@@ -54,8 +55,9 @@ class Files:
 
 
 def requests_per_second(work, files):
-    print(f"Requests per second: wrk on the same machine, one thread, {SECONDS_PER_ROW} s a row, every answer 2xx. No two")
-    print("uploads are alike, so each one is digested, inspected, written and synced; without workers (0) jobs only queue.\n")
+    print(f"Requests per second: wrk (for 10 MB: scripts/load/send.py) on the same machine, one thread, {SECONDS_PER_ROW} s")
+    print("a row, every answer 2xx. No two uploads are alike, so each one is digested, inspected, written and synced;")
+    print("without workers (0) its job only queues.\n")
     print("| request | connections | workers | requests/s | median latency, ms | p99, ms |")
     print("|---|---|---|---|---|---|")
     service = Service(BINARY, os.path.join(work, "rps"), log=os.path.join(work, "rps.log"))
@@ -89,8 +91,13 @@ def requests_per_second(work, files):
             flags = ("--workers", str(workers))
             service = Service(BINARY, data_dir, log=os.path.join(work, "upload.log"), flags=flags)
             _, session = service.new_session("P-001")
-            script = (UNIQUE_POST, file, content_type, service.key, mark)
-            row(name, service, f"/v1/sessions/{session}/recordings", connections, workers, script)
+            path = f"/v1/sessions/{session}/recordings"
+            if os.path.getsize(file) < 1e6:
+                script = (UNIQUE_POST, file, content_type, service.key, mark)
+                row(name, service, path, connections, workers, script)
+            else:
+                load = Load(service, path, content_type, read(file), mark.encode(), connections, SECONDS_PER_ROW)
+                print_row(name, connections, workers, load.rate, load.percentile(50), load.percentile(99))
             service.kill()
             shutil.rmtree(data_dir)
 
@@ -107,6 +114,10 @@ def row(name, service, path, connections, workers=2, script=None):
     if refused:
         raise SystemExit(f"{name}: {refused[0]}\n{said}")
     p50, p99 = (milliseconds(re.search(rf"\s{p}%\s+([\d.]+)(us|ms|s)", said)) for p in (50, 99))
+    print_row(name, connections, workers, rate, p50, p99)
+
+
+def print_row(name, connections, workers, rate, p50, p99):
     digits = 0 if rate >= 100 else 1
     print(f"| {name} | {connections} | {workers} | {rate:.{digits}f} | {p50:.1f} | {p99:.1f} |", flush=True)
 
