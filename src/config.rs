@@ -12,7 +12,7 @@ pub struct Config {
     pub data_dir: PathBuf,
     /// Address to listen on.
     pub listen: SocketAddr,
-    /// Jobs that run at the same time.
+    /// Jobs that run at the same time; 0 leaves them to another process.
     pub workers: usize,
     /// Largest accepted recording, bytes.
     pub max_recording_bytes: u64,

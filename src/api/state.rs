@@ -1,6 +1,7 @@
 //! What every handler can reach.
 
 use super::metrics;
+use super::series::RecentSeries;
 use crate::config::Config;
 use crate::queue::Queue;
 use crate::recording::decode::Limits;
@@ -27,6 +28,8 @@ pub struct AppState {
     pub limits: Limits,
     /// One permit for each JSON recording in memory.
     pub json_uploads: Arc<Semaphore>,
+    /// Series that were read a moment ago.
+    pub recent_series: RecentSeries,
     /// The numbers for the operator.
     pub metrics: PrometheusHandle,
     /// Fires when the service shuts down, so that endless answers end.
@@ -45,6 +48,7 @@ impl AppState {
             config: Arc::new(config),
             limits,
             json_uploads: Arc::new(Semaphore::new(JSON_UPLOADS_AT_ONCE)),
+            recent_series: RecentSeries::default(),
             metrics: metrics::recorder()?,
             shutdown: CancellationToken::new(),
         })

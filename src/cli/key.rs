@@ -41,7 +41,7 @@ enum Action {
     },
     /// List keys, revoked ones too
     List,
-    /// Take a key out of use, at once
+    /// Take a key out of use; a service that runs follows within half a second
     Revoke {
         /// The client's id, as `list` shows it.
         id: Uuid,

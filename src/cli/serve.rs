@@ -39,7 +39,7 @@ pub struct Args {
     /// Address to listen on; port 0 chooses a free one.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
-    /// Jobs that run at the same time.
+    /// Jobs that run at the same time; 0 serves the API only and leaves jobs to another process.
     #[arg(long, value_name = "N")]
     pub workers: Option<usize>,
     /// Largest accepted recording, bytes.

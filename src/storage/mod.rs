@@ -20,6 +20,7 @@ pub mod clock;
 pub mod error;
 pub mod id;
 pub mod idempotency;
+mod known_keys;
 pub mod organisations;
 pub mod page;
 pub mod patients;
@@ -43,6 +44,7 @@ pub use recordings::{NewRecording, RecordingFilter, StoredRecording};
 pub use series::{Parts, SeriesQuery, SeriesSlice};
 pub use sessions::{NewSession, Session, SessionFilter};
 
+use known_keys::KnownKeys;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{Sqlite, SqlitePool, Transaction};
 use std::path::Path;
@@ -68,6 +70,7 @@ pub struct Store {
     readers: SqlitePool,
     blobs: BlobStore,
     clock: Arc<dyn Clock>,
+    known_keys: KnownKeys,
 }
 
 impl Store {
@@ -96,7 +99,7 @@ impl Store {
         let writer = pool().max_connections(1).connect_with(options.clone()).await?;
         MIGRATIONS.run(&writer).await?;
         let readers = pool().max_connections(READERS).connect_with(options.pragma("query_only", "ON")).await?;
-        Ok(Self { writer, readers, blobs, clock })
+        Ok(Self { writer, readers, blobs, clock, known_keys: KnownKeys::default() })
     }
 
     /// The blobs.

@@ -1,6 +1,10 @@
 //! Series of an assessment: chosen channels and times, thinned out when asked, as JSON or CSV.
 
+mod number;
+mod recent;
 mod write;
+
+pub use recent::RecentSeries;
 
 use super::auth::Caller;
 use super::error::{ApiError, FieldError};
@@ -13,6 +17,7 @@ use crate::storage::{AssessmentId, Parts, SeriesQuery, StoredAssessment};
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
 use garde::Validate;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -150,12 +155,23 @@ async fn read_series(
     if tag.is_known(&headers) {
         return Ok(tag.not_modified());
     }
-    let slice = state.store.series_of_assessment(&caller.access, path.id, &query).await?;
-    let writing = tokio::task::spawn_blocking(move || match form {
-        Form::Json => ("application/json", write::json(&assessment, &slice)),
-        Form::Csv => ("text/csv; charset=utf-8", write::csv(&slice)),
-    });
-    let (content_type, body) = writing.await.map_err(ApiError::internal)?;
+    let body = match state.recent_series.find(&tag) {
+        Some(body) => body,
+        None => {
+            let slice = state.store.series_of_assessment(&caller.access, path.id, &query).await?;
+            let writing = tokio::task::spawn_blocking(move || match form {
+                Form::Json => write::json(&assessment, &slice),
+                Form::Csv => write::csv(&slice),
+            });
+            let body = Bytes::from(writing.await.map_err(ApiError::internal)?);
+            state.recent_series.keep(&tag, &body);
+            body
+        }
+    };
+    let content_type = match form {
+        Form::Json => "application/json",
+        Form::Csv => "text/csv; charset=utf-8",
+    };
     let mut response = tag.on(([(header::CONTENT_TYPE, content_type)], body).into_response());
     response.headers_mut().append(header::VARY, HeaderValue::from_static("accept"));
     Ok(response)

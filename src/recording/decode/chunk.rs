@@ -2,35 +2,62 @@
 
 use super::record::{Chunk, Fields, Malformed};
 use crate::recording::DecodeError;
-use std::borrow::Cow;
 use std::io::Read;
+use zstd::bulk::Decompressor;
 
-/// The chunk's records, decompressed, with their checksum verified; at most `limit` bytes.
-pub(super) fn open<'a>(chunk: &Chunk<'a>, limit: usize) -> Result<Cow<'a, [u8]>, DecodeError> {
-    if chunk.uncompressed_size > limit as u64 {
-        let sentence = format!(
-            "a chunk holds {} bytes after decompression, at most {limit} are accepted; write smaller chunks",
-            chunk.uncompressed_size
-        );
-        return Err(DecodeError::new("decompression_limit", sentence));
+/// Opens chunks one after the other into the same memory.
+#[derive(Default)]
+pub(super) struct Opener {
+    zstd: Option<Decompressor<'static>>,
+    content: Vec<u8>,
+}
+
+impl Opener {
+    /// The chunk's records, decompressed, with their checksum verified; at most `limit` bytes.
+    pub(super) fn open<'a>(&'a mut self, chunk: &Chunk<'a>, limit: usize) -> Result<&'a [u8], DecodeError> {
+        let content = self.decompress(chunk, limit)?;
+        check(content, chunk)?;
+        Ok(content)
     }
-    let size = chunk.uncompressed_size;
-    let content = match chunk.compression {
-        "" => Cow::Borrowed(chunk.data),
-        "zstd" => match zstd::stream::read::Decoder::with_buffer(chunk.data) {
-            Ok(decoder) => Cow::Owned(read_at_most(decoder, size)?),
-            Err(error) => return Err(corrupt(&error)),
-        },
-        "lz4" => match lz4::Decoder::new(chunk.data) {
-            Ok(decoder) => Cow::Owned(read_at_most(decoder, size)?),
-            Err(error) => return Err(corrupt(&error)),
-        },
-        other => {
-            let shown: String = other.chars().take(16).collect();
-            let sentence = format!("chunks are compressed with `{shown}`; use `zstd`, `lz4` or none");
-            return Err(DecodeError::new("unsupported_compression", sentence));
+
+    fn decompress<'a>(&'a mut self, chunk: &Chunk<'a>, limit: usize) -> Result<&'a [u8], DecodeError> {
+        let size = usize::try_from(chunk.uncompressed_size).unwrap_or(usize::MAX);
+        if size > limit {
+            let sentence = format!(
+                "a chunk holds {size} bytes after decompression, at most {limit} are accepted; write smaller chunks"
+            );
+            return Err(DecodeError::new("decompression_limit", sentence));
         }
-    };
+        self.content.clear();
+        match chunk.compression {
+            "" => return Ok(chunk.data),
+            "zstd" => {
+                let zstd = match &mut self.zstd {
+                    Some(zstd) => zstd,
+                    none => none.insert(Decompressor::new().map_err(|error| corrupt(&error))?),
+                };
+                // Reserved is not used: the system gives pages to what is written, which is never more than the limit.
+                self.content.reserve_exact(size);
+                zstd.decompress_to_buffer(chunk.data, &mut self.content).map_err(|error| corrupt(&error))?;
+            }
+            "lz4" => {
+                let decoder = lz4::Decoder::new(chunk.data).map_err(|error| corrupt(&error))?;
+                // One byte more than allowed, so that a longer content shows.
+                let mut decoder = decoder.take(chunk.uncompressed_size + 1);
+                decoder.read_to_end(&mut self.content).map_err(|error| corrupt(&error))?;
+            }
+            other => {
+                let shown: String = other.chars().take(16).collect();
+                let sentence = format!("chunks are compressed with `{shown}`; use `zstd`, `lz4` or none");
+                return Err(DecodeError::new("unsupported_compression", sentence));
+            }
+        }
+        Ok(&self.content)
+    }
+}
+
+fn check(content: &[u8], chunk: &Chunk<'_>) -> Result<(), DecodeError> {
+    let size = chunk.uncompressed_size;
     if content.len() as u64 != size {
         let sentence =
             format!("a chunk holds {} bytes where its header says {size}; send the recording again", content.len());
@@ -39,7 +66,7 @@ pub(super) fn open<'a>(chunk: &Chunk<'a>, limit: usize) -> Result<Cow<'a, [u8]>,
     // Zero means that the writer computed none.
     if chunk.uncompressed_crc != 0 {
         let mut crc = flate2::Crc::new();
-        crc.update(&content);
+        crc.update(content);
         if crc.sum() != chunk.uncompressed_crc {
             let sentence = format!(
                 "a chunk's checksum is {:08x}, its header says {:08x}: the bytes changed on the way; send the recording again",
@@ -49,14 +76,7 @@ pub(super) fn open<'a>(chunk: &Chunk<'a>, limit: usize) -> Result<Cow<'a, [u8]>,
             return Err(DecodeError::new("checksum_mismatch", sentence));
         }
     }
-    Ok(content)
-}
-
-/// Reads one byte more than allowed, so that a longer content shows.
-fn read_at_most(decoder: impl Read, size: u64) -> Result<Vec<u8>, DecodeError> {
-    let mut content = Vec::new();
-    decoder.take(size + 1).read_to_end(&mut content).map_err(|error| corrupt(&error))?;
-    Ok(content)
+    Ok(())
 }
 
 fn corrupt(error: &std::io::Error) -> DecodeError {

@@ -2,7 +2,7 @@
 
 use super::assembler::Assembler;
 use super::checks::coordinates_from_names;
-use super::chunk;
+use super::chunk::{self, Opener};
 use super::json_error::defect_in_json;
 use super::limits::Limits;
 use super::message::{BatchMessage, FrameMessage};
@@ -111,6 +111,7 @@ enum Topic {
 #[derive(Default)]
 struct Content {
     has_profile: bool,
+    opener: Opener,
     channels: HashMap<u16, (Vec<u8>, Topic)>,
     n_decompressed: u64,
     n_messages: u64,
@@ -160,7 +161,14 @@ impl Content {
 
     fn chunk(&mut self, data: &[u8], assembler: &mut Assembler) -> Result<(), DecodeError> {
         let chunk = Chunk::parse(data).map_err(malformed)?;
-        let content = chunk::open(&chunk, assembler.limits().max_chunk_bytes)?;
+        // Taken out, so that its memory and the rest of this can be used at the same time.
+        let mut opener = std::mem::take(&mut self.opener);
+        let result = self.chunk_records(opener.open(&chunk, assembler.limits().max_chunk_bytes)?, assembler);
+        self.opener = opener;
+        result
+    }
+
+    fn chunk_records(&mut self, content: &[u8], assembler: &mut Assembler) -> Result<(), DecodeError> {
         self.n_chunks += 1;
         self.n_decompressed += content.len() as u64;
         let limit = assembler.limits().max_decompressed_bytes;
@@ -168,7 +176,7 @@ impl Content {
             let sentence = format!("the chunks hold more than {limit} bytes after decompression; split the recording");
             return Err(DecodeError::new("decompression_limit", sentence));
         }
-        let mut records = Fields::new(&content);
+        let mut records = Fields::new(content);
         while let Some(record) = chunk::next_record(&mut records) {
             let (opcode, data) = record.map_err(malformed)?;
             self.record_of_data(opcode, data, assembler)?;
