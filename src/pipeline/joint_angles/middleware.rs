@@ -147,7 +147,11 @@ fn long_axis(
     let mut sum = Vector3::zeros();
     let mut count = 0;
     for (rotation, points) in rotations.iter().zip(&observations.points) {
-        if let (Some(rotation), Some(direction)) = (rotation, direction(points, segment).try_normalize(1e-6)) {
+        // A missing point makes the direction NaN, whose norm is neither small nor large.
+        let direction = direction(points, segment);
+        if let (Some(rotation), Some(direction)) = (rotation, direction.try_normalize(1e-6))
+            && direction.x.is_finite()
+        {
             sum += rotation.inverse() * direction;
             count += 1;
         }
@@ -257,6 +261,24 @@ mod tests {
         let recorded = vec![Some(Rotation3::identity()), Some(Rotation3::from_axis_angle(&Vector3::x_axis(), 2.0))];
         let (kept, flags) = without_flips(&recorded, &axis);
         assert_eq!((kept[1], flags[1]), (recorded[1].expect("a rotation"), 0));
+    }
+
+    #[test]
+    fn a_lost_joint_does_not_hide_the_long_axis() {
+        let mut points = [Vector3::zeros(); POINT_COUNT];
+        for limb in Limb::ALL {
+            points[point_index(limb, 1)] = Vector3::new(0.0, -0.4, 0.0);
+        }
+        let mut lost = points;
+        lost[point_index(Limb::LeftLeg, 1)] = Vector3::repeat(f64::NAN);
+        let observations = Observations {
+            time_ns: vec![0, 33_000_000],
+            points: vec![lost, points],
+            subject_from_world: Rotation3::identity(),
+        };
+        let left_thigh = 1 + 2 * Limb::LeftLeg.index();
+        let axis = long_axis(&[Some(Rotation3::identity()); 2], &observations, left_thigh);
+        assert_eq!(axis, Some(-Vector3::y()));
     }
 
     #[test]
