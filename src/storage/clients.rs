@@ -64,6 +64,11 @@ pub struct Client {
 }
 
 impl Client {
+    /// True while the last use that the database knows of is recent enough to stand for one at `now`.
+    fn was_used_lately(&self, now: OffsetDateTime) -> bool {
+        self.last_used_at.is_some_and(|last| now - last < LAST_USE_RESOLUTION)
+    }
+
     /// How far the client reaches.
     pub fn access(&self) -> Access {
         Access { organisation: self.organisation_id, client: self.id, own_sessions_only: self.role == Role::Device }
@@ -185,8 +190,10 @@ impl Store {
     /// When the database fails.
     pub async fn client_of_key(&self, key: &ApiKey) -> Result<Option<Client>, StorageError> {
         let digest = key.digest();
+        let now = self.now();
         let changes = match self.known_keys.look_up(&digest) {
-            Known::Client(client) => return Ok(Some(client)),
+            Known::Client(client) if client.was_used_lately(now) => return Ok(Some(client)),
+            Known::Client(_) => self.known_keys.changes(),
             Known::Nothing { changes } => changes,
         };
         // Comparing digests in the index leaks at most a prefix of a digest, from which no key can be made.
@@ -194,10 +201,10 @@ impl Store {
             .bind(&digest[..])
             .fetch_optional(self.reader())
             .await?;
-        let Some(client) = row.as_ref().map(client_from_row).transpose()? else { return Ok(None) };
-        let now = self.now();
-        if client.last_used_at.is_none_or(|last| now - last >= LAST_USE_RESOLUTION) {
+        let Some(mut client) = row.as_ref().map(client_from_row).transpose()? else { return Ok(None) };
+        if !client.was_used_lately(now) {
             self.note_use(client.id, now).await?;
+            client.last_used_at = Some(now);
         }
         self.known_keys.remember(digest, &client, changes);
         Ok(Some(client))

@@ -43,6 +43,10 @@ impl KnownKeys {
         }
     }
 
+    pub(super) fn changes(&self) -> u64 {
+        self.lock().changes
+    }
+
     pub(super) fn remember(&self, key: KeyDigest, client: &Client, changes: u64) {
         let mut table = self.lock();
         if table.changes == changes {
