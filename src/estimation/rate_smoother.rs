@@ -62,10 +62,8 @@ struct Belief<P, const D: usize> {
 #[derive(Debug, Clone)]
 struct Stored<P, const D: usize> {
     updated: Belief<P, D>,
-    /// `P_pp` before the update and `H` at the final posture give the gain again; keeping its two products is cheaper.
-    retained: Block<D>,
-    rate_gain: Block<D>,
-    weight: Block<D>,
+    /// `H` at the final posture: with the updated covariance it gives the gain again, for less memory than the gain.
+    information: Block<D>,
     weighted_innovation: SVector<f64, D>,
     /// Coefficients (a, b) of the step that led to this frame.
     step: (f64, f64),
@@ -143,18 +141,18 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         let belief = &mut self.belief;
         let predicted = belief.posture.clone();
         let mut posture = predicted.clone();
+        let mut information = Block::zeros();
         let mut weight = Block::zeros();
-        let mut retained = Block::identity();
         let mut innovation = SVector::zeros();
         for _ in 0..self.settings.iterations {
-            let (information, gradient) = model.information(t, &posture);
+            let gradient;
+            (information, gradient) = model.information(t, &posture);
             let from_prediction = model.step_between(&predicted, &posture);
             let system = Block::identity() + information * belief.pp;
             // I + H P has only eigenvalues ≥ 1, since H and P are positive semi-definite: the solution exists.
             let Some(inverse) = system.try_inverse() else { break };
             innovation = inverse * (gradient + information * from_prediction);
             weight = inverse * information;
-            retained = inverse.transpose();
             let correction = belief.pp * innovation;
             posture = model.moved(&predicted, &correction);
         }
@@ -168,7 +166,7 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         belief.pp -= to_posture * belief.pp;
         symmetrize(&mut belief.pp);
         symmetrize(&mut belief.rr);
-        Stored { updated: belief.clone(), retained, rate_gain, weight, weighted_innovation: innovation, step }
+        Stored { updated: belief.clone(), information, weighted_innovation: innovation, step }
     }
 
     /// The backward pass: estimates of all frames given all observations, last frame first.
@@ -187,11 +185,13 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
                 rate: u.rate - (u.pr.transpose() * lp + u.rr * lr),
                 covariance,
             });
-            // Through the update: C = I − K H, with C_pp = retained and C_rp = −rate_gain.
-            let (c, k) = (&frame.retained, &frame.rate_gain);
+            // Through the update: C = I − K, with C_pp = I − P_pp H and C_rp = −P_rp H after the update.
+            let c = Block::identity() - u.pp * frame.information;
+            let k = u.pr.transpose() * frame.information;
+            let weight = frame.information * c;
             let cp = c.transpose() * pp - k.transpose() * pr.transpose();
             let cr = c.transpose() * pr - k.transpose() * rr;
-            pp = cp * c - cr * k + frame.weight;
+            pp = cp * c - cr * k + weight;
             pr = cr;
             lp = c.transpose() * lp - k.transpose() * lr - frame.weighted_innovation;
             // Through the prediction: F = [I aI; 0 bI].

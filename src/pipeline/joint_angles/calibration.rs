@@ -1,7 +1,7 @@
 //! Segment lengths, trunk offsets and facing direction of the subject in one recording (\[angles\], calibration).
 //!
 //! The paper measures them in the first static instants. A window counts as static when the points drift by less than
-//! [`STILL_BELOW`] in it; most real recordings have none, and are calibrated on robust averages over the whole.
+//! `STILL_BELOW` in it; most real recordings have none, and are calibrated on robust averages over the whole.
 
 use super::observation::Observations;
 use crate::assessment::Warning;

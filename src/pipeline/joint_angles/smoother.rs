@@ -139,7 +139,7 @@ impl<'a> Model<'a> {
 
 impl Model<'_> {
     /// What an offset of the sensor that outlasts the smoothing does to a posture, rad²: the covariance of one frame's
-    /// estimate from points that are each off by [`Model::slow_offset`], with the twist prior.
+    /// estimate from points that are each off by the slow offset, with the twist prior.
     fn offset_covariance(&self, t: usize, pose: &Pose) -> PoseCovariance {
         let (_, jacobian) = forward_kinematics_with_jacobian(self.skeleton, pose);
         let seen = self.observations.seen(t);
