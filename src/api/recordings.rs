@@ -111,6 +111,9 @@ impl Validate for JobRequest {
         if !(16..=65_536).contains(&settings.particles) {
             report.append(parent().join("particles"), garde::Error::new("must lie between 16 and 65536"));
         }
+        if !(0.0..=1.0).contains(&settings.min_confidence) {
+            report.append(parent().join("min_confidence"), garde::Error::new("must lie between 0 and 1"));
+        }
         if settings.seed > MAX_SEED {
             report.append(parent().join("seed"), garde::Error::new(format!("must be at most {MAX_SEED}")));
         }

@@ -144,6 +144,16 @@ async fn a_device_uploads_to_its_own_sessions_only() {
 }
 
 #[tokio::test]
+async fn a_confidence_limit_that_is_no_share_is_refused() {
+    let app = TestApp::new().await;
+    let uploaded = app.uploaded().await;
+    let path = format!("/v1/recordings/{}/jobs", text(&uploaded["recording"]["id"]));
+    let settings = json!({"pipeline": "joint_angles", "min_confidence": -1.0});
+    let problem = app.post(&path).json(&settings).send().await.refused(422, "invalid_body");
+    assert!(problem.to_string().contains("min_confidence"), "{problem}");
+}
+
+#[tokio::test]
 async fn a_recording_is_assessed_again_with_other_settings() {
     let app = TestApp::with_assess(samples::known_result()).await;
     let uploaded = app.uploaded().await;
