@@ -154,7 +154,7 @@ pub struct AssessmentsQuery {
     pub pipeline: Option<String>,
     /// Only by this method.
     #[garde(custom(super::text::optional_word))]
-    #[param(pattern = "^[a-z0-9_]{1,64}$", example = "smoother")]
+    #[param(pattern = "^[a-z0-9_]{1,64}$", example = "iekf")]
     pub method: Option<String>,
 }
 

@@ -114,6 +114,9 @@ impl Validate for JobRequest {
         if !(0.0..=1.0).contains(&settings.min_confidence) {
             report.append(parent().join("min_confidence"), garde::Error::new("must lie between 0 and 1"));
         }
+        if let Err(error) = settings.chosen_pass() {
+            report.append(parent().join("pass"), garde::Error::new(error.to_string()));
+        }
         if settings.seed > MAX_SEED {
             report.append(parent().join("seed"), garde::Error::new(format!("must be at most {MAX_SEED}")));
         }

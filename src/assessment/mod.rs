@@ -11,7 +11,7 @@ pub use joint_angles::AngleChannel;
 pub use provenance::Provenance;
 pub use quality::{Event, Quality, Warning};
 pub use series::{ChannelSummary, Series};
-pub use settings::{JointAngleSettings, Method, Settings};
+pub use settings::{JointAngleSettings, Method, Pass, Settings};
 
 /// One pipeline's result on one recording.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,10 +10,10 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The default: iterated extended Kalman filter with robust weights and a backward pass over the recording.
-    Smoother,
+    /// The default: iterated extended Kalman filter over posture and rates with a Student-t weight for each point.
+    Iekf,
     /// The paper's particle filter: prior as the proposal, multinomial resampling at every frame, mean as estimate.
-    Paper,
+    Particle,
     /// Closed geometry, frame by frame.
     Ik,
     /// The middleware's own rotations, with 180° axial flips undone.
@@ -22,22 +22,54 @@ pub enum Method {
 
 impl Method {
     /// Every method, the default first.
-    pub const ALL: [Method; 4] = [Method::Smoother, Method::Paper, Method::Ik, Method::Nite];
+    pub const ALL: [Method; 4] = [Method::Iekf, Method::Particle, Method::Ik, Method::Nite];
+
+    /// True of methods that can go back over the recording after they have been through it.
+    pub fn can_smooth(self) -> bool {
+        matches!(self, Method::Iekf)
+    }
 
     /// Name in settings, tables and provenance.
     pub fn name(self) -> &'static str {
         match self {
-            Method::Smoother => "smoother",
-            Method::Paper => "paper",
+            Method::Iekf => "iekf",
+            Method::Particle => "particle",
             Method::Ik => "ik",
             Method::Nite => "nite",
         }
     }
 }
 
+/// Whether an estimate of a frame rests on the frames up to it or on the whole recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Pass {
+    /// Forwards only: what a live use of the method would have known.
+    Filter,
+    /// Forwards, then back over the whole recording.
+    Smooth,
+}
+
+impl FromStr for Pass {
+    type Err = UnknownPass;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        match name {
+            "filter" => Ok(Pass::Filter),
+            "smooth" => Ok(Pass::Smooth),
+            _ => Err(UnknownPass(name.to_owned())),
+        }
+    }
+}
+
+/// A pass that does not exist.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no pass; there are filter and smooth")]
+pub struct UnknownPass(pub String);
+
 /// A method that does not exist.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no method; there are smoother, paper, ik and nite")]
+#[error("`{0}` is no method; there are iekf, particle, ik and nite")]
 pub struct UnknownMethod(pub String);
 
 impl FromStr for Method {
@@ -74,7 +106,10 @@ impl Default for Settings {
 pub struct JointAngleSettings {
     /// How angles are estimated.
     pub method: Method,
-    /// Particles of the `paper` method, 16 to 65536; the paper compares 128, 512 and 2048.
+    /// Whether the estimate of a frame rests on the frames up to it (`filter`) or on the whole recording (`smooth`).
+    /// Null means `smooth` with methods that can, `filter` with others.
+    pub pass: Option<Pass>,
+    /// Particles of the `particle` method, 16 to 65536; the paper compares 128, 512 and 2048.
     #[schema(minimum = 16, maximum = 65536)]
     pub particles: u32,
     /// Seed of the random streams, at most 2^53 - 1, so that every JSON library reads the same number.
@@ -87,6 +122,25 @@ pub struct JointAngleSettings {
 
 impl Default for JointAngleSettings {
     fn default() -> Self {
-        Self { method: Method::Smoother, particles: 512, seed: 1, min_confidence: 0.3 }
+        Self { method: Method::Iekf, pass: None, particles: 512, seed: 1, min_confidence: 0.3 }
     }
 }
+
+impl JointAngleSettings {
+    /// The pass that runs: the one asked for, or the best that the method can do.
+    ///
+    /// # Errors
+    /// [`NoBackwardPass`] when a method that has none is asked to smooth.
+    pub fn chosen_pass(&self) -> Result<Pass, NoBackwardPass> {
+        match self.pass {
+            Some(Pass::Smooth) if !self.method.can_smooth() => Err(NoBackwardPass(self.method)),
+            Some(pass) => Ok(pass),
+            None => Ok(if self.method.can_smooth() { Pass::Smooth } else { Pass::Filter }),
+        }
+    }
+}
+
+/// A method was asked to smooth that only goes forwards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the method `{0}` has no backward pass; use pass `filter`, leave it out, or choose the method iekf")]
+pub struct NoBackwardPass(pub Method);

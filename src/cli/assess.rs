@@ -1,6 +1,6 @@
 //! `surefoot assess`: one recording, assessed on this machine without a service.
 
-use crate::assessment::{Assessment, JointAngleSettings, Method, Settings};
+use crate::assessment::{Assessment, JointAngleSettings, Method, Pass, Settings};
 use crate::pipeline;
 use crate::progress::{Monitor, Step};
 use crate::recording::decode::{Limits, decode};
@@ -19,13 +19,16 @@ use std::time::Duration;
 /// interval. The same file and settings always give the same numbers as an upload would.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot assess squat.mcap\n  surefoot assess squat.mcap --csv angles.csv\n  \
-    surefoot assess squat.json --method paper --particles 2048 --json")]
+    surefoot assess squat.json --method particle --particles 2048 --json")]
 pub struct Args {
     /// Recording, .mcap or .json; the content decides
     recording: PathBuf,
-    /// smoother (the default), paper (the paper's particle filter), ik (closed geometry), nite (middleware's rotations)
-    #[arg(long, default_value_t = Method::Smoother, value_name = "METHOD")]
+    /// iekf (the default), particle (the paper's particle filter), ik (closed geometry), nite (middleware's rotations)
+    #[arg(long, default_value_t = Method::Iekf, value_name = "METHOD")]
     method: Method,
+    /// smooth (over the whole recording; the default of methods that can) or filter (from the frames up to each)
+    #[arg(long, value_name = "PASS")]
+    pass: Option<Pass>,
     /// Particles of the paper's filter
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536))]
     particles: u32,
@@ -49,6 +52,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let recording = recording_of(&bytes).with_context(|| args.recording.display().to_string())?;
     let settings = Settings::JointAngles(JointAngleSettings {
         method: args.method,
+        pass: args.pass,
         particles: args.particles,
         seed: args.seed,
         ..JointAngleSettings::default()

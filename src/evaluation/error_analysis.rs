@@ -171,7 +171,7 @@ mod tests {
     fn a_method_nearer_than_the_middleware_in_every_frame_has_a_positive_gain() {
         let own = errors(&[1.0, 2.0, 3.0, 4.0, 5.0], &[1.0; 5]);
         let middleware = errors(&[3.0, 5.0, 7.0, 9.0, 11.0], &[1.0; 5]);
-        let row = error_row("smoother", Side::Left, &[(&own, Some(&middleware))]);
+        let row = error_row("iekf", Side::Left, &[(&own, Some(&middleware))]);
         let gain = row.hip_gain.unwrap();
         // Differences 2, 3, 4, 5, 6; rank sum 15 against a mean of 7.5 with variance 5 · 6 · 11 / 24 = 13.75.
         assert_eq!(gain.difference, Spread { mean_deg: 4.0, p25_deg: 3.0, p75_deg: 5.0 });

@@ -158,15 +158,14 @@ async fn a_recording_is_assessed_again_with_other_settings() {
     let app = TestApp::with_assess(samples::known_result()).await;
     let uploaded = app.uploaded().await;
     let path = format!("/v1/recordings/{}/jobs", text(&uploaded["recording"]["id"]));
-    let settings = json!({"pipeline": "joint_angles", "method": "paper", "particles": 128, "min_confidence": 0.5});
+    let settings = json!({"pipeline": "joint_angles", "method": "particle", "particles": 128, "min_confidence": 0.5});
     let answer = app.post(&path).json(&settings).send().await;
     let job = answer.expect(StatusCode::ACCEPTED);
-    let filled =
-        json!({"pipeline": "joint_angles", "method": "paper", "particles": 128, "min_confidence": 0.5, "seed": 1});
+    let filled = json!({"pipeline": "joint_angles", "method": "particle", "pass": null, "particles": 128, "min_confidence": 0.5, "seed": 1});
     assert_eq!(job["settings"], filled);
     assert_eq!(answer.header("location"), format!("/v1/jobs/{}", text(&job["id"])));
     app.run_pending_jobs().await;
-    let list = app.get("/v1/assessments?method=paper").send().await.expect(StatusCode::OK);
+    let list = app.get("/v1/assessments?method=particle").send().await.expect(StatusCode::OK);
     assert_eq!(list["items"].as_array().unwrap().len(), 1);
     let all = app.get("/v1/assessments").send().await.expect(StatusCode::OK);
     assert_eq!(all["items"].as_array().unwrap().len(), 2, "earlier assessments stay");

@@ -73,14 +73,18 @@ fn the_same_recording_settings_and_seed_give_the_same_bits_on_any_number_of_thre
             found.series.iter().map(|s| (bits(&s.value), bits(&s.low), s.flags.clone())).collect::<Vec<_>>()
         };
         assert_eq!(on(1, 1), on(3, 1), "{method}");
-        assert_eq!(on(1, 1) != on(1, 2), method == Method::Paper, "only `paper` depends on the seed, not {method}");
+        assert_eq!(
+            on(1, 1) != on(1, 2),
+            method == Method::Particle,
+            "only `particle` depends on the seed, not {method}"
+        );
     }
 }
 
 #[test]
 fn a_mirrored_recording_is_refused_because_knees_bend_backwards() {
     let recording = mirrored(exercise(Exercise::BackKnee, Preset::Clean, 20.0));
-    let (code, sentence) = refusal(&recording, Method::Smoother);
+    let (code, sentence) = refusal(&recording, Method::Iekf);
     assert_eq!(code, "handedness_mismatch");
     assert!(sentence.contains("handedness"), "{sentence}");
 }
@@ -88,20 +92,20 @@ fn a_mirrored_recording_is_refused_because_knees_bend_backwards() {
 #[test]
 fn positions_in_centimetres_are_refused_as_no_human_body() {
     let recording = centimetres(exercise(Exercise::BackKnee, Preset::Clean, 8.0));
-    assert_eq!(refusal(&recording, Method::Smoother).0, "implausible_body");
+    assert_eq!(refusal(&recording, Method::Iekf).0, "implausible_body");
 }
 
 #[test]
 fn a_recording_without_knees_is_refused_by_name() {
     let recording = without(exercise(Exercise::BackKnee, Preset::Clean, 8.0), Joint::LeftKnee);
-    let (code, sentence) = refusal(&recording, Method::Smoother);
+    let (code, sentence) = refusal(&recording, Method::Iekf);
     assert_eq!(code, "joints_missing");
     assert!(sentence.contains("left_knee"), "{sentence}");
 }
 
 #[test]
 fn a_recording_without_frames_is_refused() {
-    assert_eq!(refusal(&Recording::default(), Method::Smoother).0, "no_skeleton");
+    assert_eq!(refusal(&Recording::default(), Method::Iekf).0, "no_skeleton");
 }
 
 #[test]
@@ -149,7 +153,7 @@ fn a_cancelled_assessment_ends_without_a_result() {
 #[test]
 fn the_papers_filter_reports_how_few_particles_count() {
     let recording = exercise(Exercise::BackKnee, Preset::Table1, 8.0);
-    let found = assess(&recording, &settings(Method::Paper, 1), &Monitor::default()).unwrap();
+    let found = assess(&recording, &settings(Method::Particle, 1), &Monitor::default()).unwrap();
     let size = found.quality.effective_sample_size.unwrap();
     assert_eq!(size.particles, 128);
     assert!((1.0..40.0).contains(&size.median) && size.min >= 1.0, "{size:?}");

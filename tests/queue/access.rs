@@ -53,7 +53,7 @@ async fn assessments_are_found_by_what_they_are_of_and_how_they_were_made() {
     let bench = Bench::new().await;
     let (queue, store) = (&bench.queue, bench.queue.store());
     let mut ids = Vec::new();
-    for method in ["ik", "smoother"] {
+    for method in ["ik", "iekf"] {
         let job = bench.submit(method.as_bytes()).await;
         queue.claim("w").await.unwrap().unwrap();
         let mut found = assessment(b"abc");

@@ -128,7 +128,7 @@ pub fn assessment(bytes: &[u8]) -> Assessment {
         summary: vec![series.summarize()],
         series: vec![series],
         quality: Quality::default(),
-        provenance: Provenance { method: "smoother".into(), ..Provenance::default() },
+        provenance: Provenance { method: "iekf".into(), ..Provenance::default() },
     }
 }
 

@@ -34,7 +34,7 @@ enum What {
 /// three-point angle of the recorded joints.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot evaluate joint-angles --data ../shared/data\n  \
-    surefoot evaluate joint-angles --data uiprmd --methods raw,smoother --json\n  \
+    surefoot evaluate joint-angles --data uiprmd --methods raw,iekf --json\n  \
     surefoot evaluate joint-angles --simulated --noise kinect-v2 --seeds 10 --table")]
 struct JointAngleArgs {
     /// Directory of the data sets, or of one of them (uiprmd, utdmhad, keraal, cmu)
@@ -49,8 +49,8 @@ struct JointAngleArgs {
     /// Simulated subjects for each exercise
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
-    /// Methods, comma separated: raw, smoother, paper, ik, nite
-    #[arg(long, value_delimiter = ',', default_value = "raw,ik,paper,smoother,nite", value_name = "LIST")]
+    /// Methods, comma separated: raw, iekf, particle, ik, nite
+    #[arg(long, value_delimiter = ',', default_value = "raw,ik,particle,iekf,nite", value_name = "LIST")]
     methods: Vec<Contender>,
     /// Particles of the paper's filter
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536))]

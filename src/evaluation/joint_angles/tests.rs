@@ -80,11 +80,11 @@ fn the_result_is_the_same_with_one_and_with_several_threads() {
 }
 
 #[test]
-fn the_smoother_s_intervals_are_counted_against_the_truth() {
+fn the_default_s_intervals_are_counted_against_the_truth() {
     let sources = [trial(Exercise::BackKnee, Preset::Table1, 1)];
-    let evaluation = evaluate(&sources, &[Contender::Method(Method::Smoother)], &settings(), || ());
-    let knee = row(&evaluation, Exercise::BackKnee, "smoother", "knee_flexion");
-    let inside = knee.interval_coverage.expect("the smoother has intervals");
+    let evaluation = evaluate(&sources, &[Contender::Method(Method::Iekf)], &settings(), || ());
+    let knee = row(&evaluation, Exercise::BackKnee, "iekf", "knee_flexion");
+    let inside = knee.interval_coverage.expect("the default has intervals");
     assert!(inside > 0.5 && inside <= 1.0, "{inside}");
 }
 

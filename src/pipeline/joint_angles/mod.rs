@@ -4,15 +4,16 @@
 //! of the posture in every frame → anatomical angles with intervals and flags.
 
 pub mod calibration;
+pub mod iekf;
 pub mod inverse_kinematics;
 pub mod middleware;
 pub mod noise_model;
 pub mod observation;
-pub mod paper;
+pub mod particle;
 pub mod particle_model;
 pub mod posterior;
 pub mod sensor_noise;
-pub mod smoother;
+pub mod state_space;
 
 use super::PipelineError;
 use crate::assessment::{Assessment, JointAngleSettings, Method, Provenance, Quality, Series, Settings, Warning};
@@ -23,6 +24,7 @@ use calibration::{Calibration, calibrate};
 use noise_model::NoiseModel;
 use observation::{ALL_SEEN, Observations};
 use posterior::{Posterior, SeriesBuilder};
+use state_space::Tuning;
 
 /// Fewest frames of a recording that can be assessed.
 const MIN_FRAMES: usize = 2;
@@ -42,6 +44,8 @@ pub fn assess(
             "the recording has no skeleton frames, which joint angles are computed from; record with body tracking on",
         ));
     };
+    let pass =
+        settings.chosen_pass().map_err(|error| PipelineError::unsuitable("no_backward_pass", error.to_string()))?;
     monitor.begin(Step::Calibrating, 0)?;
     let mut observations = Observations::from_recording(skeleton, settings)?;
     let calibration = calibrate(&mut observations)?;
@@ -49,13 +53,13 @@ pub fn assess(
     let mut builder = SeriesBuilder::new(observations.len());
     let emit = |posterior: &Posterior| builder.push(posterior);
     match settings.method {
-        Method::Paper => {
+        Method::Particle => {
             let noise = NoiseModel::nite_table1();
             let sizes =
-                paper::run(&observations, &calibration, noise, settings.particles, settings.seed, monitor, emit)?;
+                particle::run(&observations, &calibration, noise, settings.particles, settings.seed, monitor, emit)?;
             quality.effective_sample_size = Some(sizes);
         }
-        Method::Smoother => smoother::run(&observations, &calibration, &smoother::Tuning::default(), monitor, emit)?,
+        Method::Iekf => iekf::run(&observations, &calibration, &Tuning::default(), pass, monitor, emit)?,
         Method::Ik => run_closed_geometry(&observations, &calibration, monitor, emit)?,
         Method::Nite => middleware::run(skeleton, &observations, &calibration, monitor, emit)?,
     }

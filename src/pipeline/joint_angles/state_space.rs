@@ -1,5 +1,5 @@
-//! The default method: an iterated extended Kalman filter over posture and rates, a Student-t weight for each point,
-//! and a backward pass over the whole recording.
+//! The state-space model that the Gaussian methods share: posture and rates as the state, twelve points as the
+//! observation, a Student-t weight for each point.
 //!
 //! What joint centres cannot show, the twist of a straight limb, is held by a weak prior at zero twist
 //! ([`Tuning::twist_sd`]). Two errors make the interval: white noise, which the passes average, and the sensor's slow
@@ -15,9 +15,7 @@ use crate::body::kinematics::{forward_kinematics, forward_kinematics_with_jacobi
 use crate::body::pose::{POSE_DIMENSION, PoseVector, attitude_offset, hinge_offset};
 use crate::body::skeleton::point_index;
 use crate::body::{Limb, POINT_COUNT, Pose, Skeleton};
-use crate::estimation::rate_smoother::{RateFilter, RateModel, RateSettings};
-use crate::pipeline::PipelineError;
-use crate::progress::{Monitor, Step};
+use crate::estimation::rate_smoother::{RateModel, RateSettings};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// What can be tuned, each with the measurement that set it in `docs/measurements.md`.
@@ -62,35 +60,9 @@ const UNSEEN_SD: f64 = std::f64::consts::FRAC_PI_3;
 /// Weight under which a point counts as an outlier of its frame.
 const OUTLIER_WEIGHT: f64 = 0.25;
 
-/// Runs the method over a recording; `emit` gets the frames in order.
-///
-/// # Errors
-/// [`PipelineError::Cancelled`].
-pub fn run(
-    observations: &Observations,
-    calibration: &Calibration,
-    tuning: &Tuning,
-    monitor: &Monitor,
-    mut emit: impl FnMut(&Posterior),
-) -> Result<(), PipelineError> {
-    monitor.begin(Step::Estimating, observations.len() as u64)?;
-    let model = Model::new(observations, &calibration.skeleton, tuning);
-    let mut filter = RateFilter::new(model.initial_pose(), tuning.rates);
-    for t in 0..observations.len() {
-        filter.step(&model, t, observations.interval_s(t));
-        monitor.advance(1)?;
-    }
-    monitor.begin(Step::Smoothing, observations.len() as u64)?;
-    let mut frames = Vec::with_capacity(observations.len());
-    filter.smooth(&model, |frame| frames.push((frame.posture, frame.covariance)));
-    for (t, (pose, covariance)) in frames.into_iter().rev().enumerate() {
-        emit(&model.posterior(t, pose, covariance));
-        monitor.advance(1)?;
-    }
-    Ok(())
-}
-
-struct Model<'a> {
+/// One subject seen by one sensor.
+#[derive(Debug)]
+pub struct StateSpace<'a> {
     observations: &'a Observations,
     skeleton: &'a Skeleton,
     tuning: &'a Tuning,
@@ -100,8 +72,10 @@ struct Model<'a> {
     slow_offset: f64,
 }
 
-impl<'a> Model<'a> {
-    fn new(observations: &'a Observations, skeleton: &'a Skeleton, tuning: &'a Tuning) -> Self {
+impl<'a> StateSpace<'a> {
+    /// The model of a calibrated subject; its noise is estimated from the observations.
+    pub fn new(observations: &'a Observations, calibration: &'a Calibration, tuning: &'a Tuning) -> Self {
+        let skeleton = &calibration.skeleton;
         let white = white_noise(observations);
         let slow_offset = slow_offset(observations, &white);
         let model_variance = slow_offset.clamp(tuning.model_sd[0], tuning.model_sd[1]).powi(2);
@@ -109,7 +83,8 @@ impl<'a> Model<'a> {
         Self { observations, skeleton, tuning, precision, slow_offset }
     }
 
-    fn initial_pose(&self) -> Pose {
+    /// Posture of the first complete frame by closed geometry.
+    pub fn initial_pose(&self) -> Pose {
         let complete = (0..self.observations.len()).find(|t| self.observations.seen(*t) == ALL_SEEN);
         complete.map_or_else(Pose::reference, |t| {
             pose_from_points(self.skeleton, &self.observations.points[t], &Pose::reference())
@@ -122,7 +97,8 @@ impl<'a> Model<'a> {
         (self.tuning.student_t_dof + 3.0) / (self.tuning.student_t_dof + distance)
     }
 
-    fn posterior(&self, t: usize, pose: Pose, covariance: PoseCovariance) -> Posterior {
+    /// Estimate of frame `t` with the offset's part in its covariance and outliers flagged.
+    pub fn posterior(&self, t: usize, pose: Pose, covariance: PoseCovariance) -> Posterior {
         let points = forward_kinematics(self.skeleton, &pose);
         let observed = &self.observations.points[t];
         let limb_flags = Limb::ALL.map(|limb| {
@@ -137,7 +113,7 @@ impl<'a> Model<'a> {
     }
 }
 
-impl Model<'_> {
+impl StateSpace<'_> {
     /// What an offset of the sensor that outlasts the smoothing does to a posture, rad²: the covariance of one frame's
     /// estimate from points that are each off by the slow offset, with the twist prior.
     fn offset_covariance(&self, t: usize, pose: &Pose) -> PoseCovariance {
@@ -160,7 +136,7 @@ impl Model<'_> {
     }
 }
 
-impl RateModel<POSE_DIMENSION> for Model<'_> {
+impl RateModel<POSE_DIMENSION> for StateSpace<'_> {
     type Posture = Pose;
 
     fn moved(&self, posture: &Pose, step: &PoseVector) -> Pose {
@@ -194,7 +170,7 @@ impl RateModel<POSE_DIMENSION> for Model<'_> {
     }
 }
 
-impl Model<'_> {
+impl StateSpace<'_> {
     /// Information and gradient of one limb with respect to trunk (3), limb attitude (3) and hinge (1).
     fn limb_information(
         &self,
@@ -268,6 +244,7 @@ impl Model<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assessment::quality::CalibrationQuality;
     use nalgebra::Rotation3;
 
     #[test]
@@ -278,7 +255,9 @@ mod tests {
         let observations =
             Observations { time_ns: vec![0], points: vec![points], subject_from_world: Rotation3::identity() };
         let tuning = Tuning::default();
-        let model = Model::new(&observations, &skeleton, &tuning);
+        let quality = CalibrationQuality { source: "test".into(), window_s: None, n_frames: 1, segments: Vec::new() };
+        let calibration = Calibration { skeleton: skeleton.clone(), quality, warnings: Vec::new() };
+        let model = StateSpace::new(&observations, &calibration, &tuning);
         let (_, jacobian) = forward_kinematics_with_jacobian(&skeleton, &truth);
         let (information, gradient) = model.information(0, &truth);
         let mut expected = PoseCovariance::zeros();
