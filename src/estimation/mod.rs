@@ -7,4 +7,5 @@ pub mod particle_filter;
 pub mod random;
 pub mod rate_smoother;
 pub mod resampling;
+pub mod truncated_normal;
 pub mod weights;

@@ -11,7 +11,8 @@
 //! `g = JᵀR⁻¹(y − h(x))` of the observation; the driver knows no body.
 //!
 //! The backward pass needs no inverse of the predicted covariance, which becomes singular when a direction is known
-//! exactly. All matrices are kept as `D × D` blocks of posture (p) and rate (r).
+//! exactly. All matrices are kept as `D × D` blocks of posture (p) and rate (r); the history keeps symmetric ones as
+//! triangles, `2.5 D² + 3.5 D` numbers a frame.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -19,6 +20,8 @@ use nalgebra::{SMatrix, SVector};
 pub trait RateModel<const D: usize> {
     /// A posture.
     type Posture: Clone;
+    /// What is seen in one frame.
+    type Observation: ?Sized;
 
     /// The posture after a small step.
     fn moved(&self, posture: &Self::Posture, step: &SVector<f64, D>) -> Self::Posture;
@@ -26,11 +29,16 @@ pub trait RateModel<const D: usize> {
     /// The step that leads from `from` to `to`.
     fn step_between(&self, from: &Self::Posture, to: &Self::Posture) -> SVector<f64, D>;
 
-    /// Information and gradient of frame `t`'s observation at a posture.
-    fn information(&self, t: usize, posture: &Self::Posture) -> (SMatrix<f64, D, D>, SVector<f64, D>);
+    /// Information and gradient of an observation at a posture, `interval_s` seconds after the frame before.
+    fn information(
+        &self,
+        observation: &Self::Observation,
+        interval_s: f64,
+        posture: &Self::Posture,
+    ) -> (SMatrix<f64, D, D>, SVector<f64, D>);
 
-    /// Spectral density of the acceleration in each direction during the interval that ends at frame `t`, rad²/s³.
-    fn acceleration_density(&self, t: usize) -> SVector<f64, D>;
+    /// Spectral density of the acceleration in each direction, rad²/s³.
+    fn acceleration_density(&self) -> SVector<f64, D>;
 }
 
 /// How the smoother runs.
@@ -58,20 +66,9 @@ struct Belief<P, const D: usize> {
     rr: Block<D>,
 }
 
-/// What the backward pass needs of one frame.
-#[derive(Debug, Clone)]
-struct Stored<P, const D: usize> {
-    updated: Belief<P, D>,
-    /// `H` at the final posture: with the updated covariance it gives the gain again, for less memory than the gain.
-    information: Block<D>,
-    weighted_innovation: SVector<f64, D>,
-    /// Coefficients (a, b) of the step that led to this frame.
-    step: (f64, f64),
-}
-
 /// Estimate of one frame.
 #[derive(Debug, Clone)]
-pub struct Smoothed<P, const D: usize> {
+pub struct Estimate<P, const D: usize> {
     /// Posture.
     pub posture: P,
     /// Rate, step units per second.
@@ -80,12 +77,16 @@ pub struct Smoothed<P, const D: usize> {
     pub covariance: SMatrix<f64, D, D>,
 }
 
-/// Filters forwards, frame by frame.
-#[derive(Debug)]
+/// Filters forwards, frame by frame. Its size does not depend on the number of frames.
+#[derive(Debug, Clone)]
 pub struct RateFilter<P, const D: usize> {
     settings: RateSettings,
     belief: Belief<P, D>,
-    stored: Vec<Stored<P, D>>,
+    /// `H` at the last frame's posture: with the updated covariance it gives the gain again, for less memory.
+    information: Block<D>,
+    weighted_innovation: SVector<f64, D>,
+    /// Coefficients (a, b) of the step that led to the last frame.
+    step: (f64, f64),
 }
 
 impl<P: Clone, const D: usize> RateFilter<P, D> {
@@ -99,20 +100,25 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
             pr: Block::zeros(),
             rr: variance(settings.initial_rate_sd),
         };
-        Self { settings, belief, stored: Vec::new() }
+        Self { settings, belief, information: Block::zeros(), weighted_innovation: SVector::zeros(), step: (0.0, 1.0) }
     }
 
     /// The next frame, `interval_s` seconds after the last. Returns the forward estimate.
-    pub fn step<M: RateModel<D, Posture = P>>(&mut self, model: &M, t: usize, interval_s: f64) -> Smoothed<P, D> {
-        let step = self.predict(model, t, interval_s);
-        let stored = self.update(model, t, step);
-        self.stored.push(stored);
-        Smoothed { posture: self.belief.posture.clone(), rate: self.belief.rate, covariance: self.belief.pp }
+    pub fn step<M: RateModel<D, Posture = P>>(
+        &mut self,
+        model: &M,
+        observation: &M::Observation,
+        interval_s: f64,
+    ) -> Estimate<P, D> {
+        self.predict(model, interval_s);
+        self.update(model, observation, interval_s);
+        Estimate { posture: self.belief.posture.clone(), rate: self.belief.rate, covariance: self.belief.pp }
     }
 
-    fn predict<M: RateModel<D, Posture = P>>(&mut self, model: &M, t: usize, interval_s: f64) -> (f64, f64) {
+    fn predict<M: RateModel<D, Posture = P>>(&mut self, model: &M, interval_s: f64) {
         if interval_s <= 0.0 {
-            return (0.0, 1.0);
+            self.step = (0.0, 1.0);
+            return;
         }
         let decay = self.settings.rate_decay_s;
         let s = interval_s / decay;
@@ -127,17 +133,17 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         let to_posture = 0.5 * decay.powi(3) * (2.0 * s - 3.0 + 4.0 * (-s).exp() - (-2.0 * s).exp());
         let to_both = 0.5 * decay.powi(2) * (-s).exp_m1().powi(2);
         let to_rate = -0.5 * decay * (-2.0 * s).exp_m1();
-        let density = model.acceleration_density(t);
+        let density = model.acceleration_density();
         for d in 0..D {
             belief.pp[(d, d)] += density[d] * to_posture;
             belief.pr[(d, d)] += density[d] * to_both;
             belief.rr[(d, d)] += density[d] * to_rate;
         }
-        (a, b)
+        self.step = (a, b);
     }
 
     /// Gauss–Newton on the posterior: `δ = P (I + H P)⁻¹ (g + H e)` with `e` from the prediction to the iterate.
-    fn update<M: RateModel<D, Posture = P>>(&mut self, model: &M, t: usize, step: (f64, f64)) -> Stored<P, D> {
+    fn update<M: RateModel<D, Posture = P>>(&mut self, model: &M, observation: &M::Observation, interval_s: f64) {
         let belief = &mut self.belief;
         let predicted = belief.posture.clone();
         let mut posture = predicted.clone();
@@ -146,7 +152,7 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         let mut innovation = SVector::zeros();
         for _ in 0..self.settings.iterations {
             let gradient;
-            (information, gradient) = model.information(t, &posture);
+            (information, gradient) = model.information(observation, interval_s, &posture);
             let from_prediction = model.step_between(&predicted, &posture);
             let system = Block::identity() + information * belief.pp;
             // I + H P has only eigenvalues ≥ 1, since H and P are positive semi-definite: the solution exists.
@@ -166,29 +172,72 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         belief.pp -= to_posture * belief.pp;
         symmetrize(&mut belief.pp);
         symmetrize(&mut belief.rr);
-        Stored { updated: belief.clone(), information, weighted_innovation: innovation, step }
+        self.information = information;
+        self.weighted_innovation = innovation;
+    }
+}
+
+/// What the backward pass needs of the frames that a filter has been through.
+#[derive(Debug)]
+pub struct RateHistory<P, const D: usize> {
+    frames: Vec<Stored<P, D>>,
+}
+
+#[derive(Debug)]
+struct Stored<P, const D: usize> {
+    posture: P,
+    rate: SVector<f64, D>,
+    weighted_innovation: SVector<f64, D>,
+    step: (f64, f64),
+    /// Triangles of pp, rr and the information, then all of pr.
+    blocks: Box<[f64]>,
+}
+
+impl<P: Clone, const D: usize> RateHistory<P, D> {
+    /// A history with room for a number of frames.
+    pub fn with_capacity(frames: usize) -> Self {
+        Self { frames: Vec::with_capacity(frames) }
+    }
+
+    /// Keeps the frame that the filter has just been through.
+    pub fn push(&mut self, filter: &RateFilter<P, D>) {
+        let belief = &filter.belief;
+        let mut blocks = Vec::with_capacity(D * (D + 1) * 3 / 2 + D * D);
+        for block in [&belief.pp, &belief.rr, &filter.information] {
+            for column in 0..D {
+                blocks.extend((column..D).map(|row| block[(row, column)]));
+            }
+        }
+        blocks.extend_from_slice(belief.pr.as_slice());
+        self.frames.push(Stored {
+            posture: belief.posture.clone(),
+            rate: belief.rate,
+            weighted_innovation: filter.weighted_innovation,
+            step: filter.step,
+            blocks: blocks.into_boxed_slice(),
+        });
     }
 
     /// The backward pass: estimates of all frames given all observations, last frame first.
-    pub fn smooth<M: RateModel<D, Posture = P>>(self, model: &M, mut emit: impl FnMut(Smoothed<P, D>)) {
+    pub fn smooth<M: RateModel<D, Posture = P>>(self, model: &M, mut emit: impl FnMut(Estimate<P, D>)) {
         let (mut lp, mut lr) = (SVector::<f64, D>::zeros(), SVector::<f64, D>::zeros());
         let (mut pp, mut pr, mut rr) = (Block::<D>::zeros(), Block::<D>::zeros(), Block::<D>::zeros());
-        for frame in self.stored.into_iter().rev() {
-            let u = &frame.updated;
-            let from_left = (u.pp * pp + u.pr * pr.transpose(), u.pp * pr + u.pr * rr);
-            let reduction = from_left.0 * u.pp + from_left.1 * u.pr.transpose();
-            let correction = -(u.pp * lp + u.pr * lr);
-            let mut covariance = u.pp - reduction;
+        for frame in self.frames.into_iter().rev() {
+            let [u_pp, u_rr, information] = std::array::from_fn(|i| unpacked(&frame.blocks, i));
+            let u_pr = Block::<D>::from_column_slice(&frame.blocks[D * (D + 1) * 3 / 2..]);
+            let from_left = (u_pp * pp + u_pr * pr.transpose(), u_pp * pr + u_pr * rr);
+            let reduction = from_left.0 * u_pp + from_left.1 * u_pr.transpose();
+            let mut covariance = u_pp - reduction;
             symmetrize(&mut covariance);
-            emit(Smoothed {
-                posture: model.moved(&u.posture, &correction),
-                rate: u.rate - (u.pr.transpose() * lp + u.rr * lr),
+            emit(Estimate {
+                posture: model.moved(&frame.posture, &-(u_pp * lp + u_pr * lr)),
+                rate: frame.rate - (u_pr.transpose() * lp + u_rr * lr),
                 covariance,
             });
             // Through the update: C = I − K, with C_pp = I − P_pp H and C_rp = −P_rp H after the update.
-            let c = Block::identity() - u.pp * frame.information;
-            let k = u.pr.transpose() * frame.information;
-            let weight = frame.information * c;
+            let c = Block::identity() - u_pp * information;
+            let k = u_pr.transpose() * information;
+            let weight = information * c;
             let cp = c.transpose() * pp - k.transpose() * pr.transpose();
             let cr = c.transpose() * pr - k.transpose() * rr;
             pp = cp * c - cr * k + weight;
@@ -203,6 +252,20 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
             symmetrize(&mut rr);
         }
     }
+}
+
+/// The symmetric block whose lower triangle stands at place `index` of a packed history.
+fn unpacked<const D: usize>(blocks: &[f64], index: usize) -> Block<D> {
+    let mut block = Block::zeros();
+    let mut next = index * D * (D + 1) / 2;
+    for column in 0..D {
+        for row in column..D {
+            block[(row, column)] = blocks[next];
+            block[(column, row)] = blocks[next];
+            next += 1;
+        }
+    }
+    block
 }
 
 fn symmetrize<const D: usize>(matrix: &mut Block<D>) {
@@ -222,13 +285,13 @@ mod tests {
 
     /// Two independent coordinates, the first seen, the second seen together with the first.
     struct Line {
-        seen: Vec<Option<(f64, f64)>>,
         density: f64,
         noise: f64,
     }
 
     impl RateModel<2> for Line {
         type Posture = SVector<f64, 2>;
+        type Observation = Option<(f64, f64)>;
 
         fn moved(&self, posture: &Self::Posture, step: &SVector<f64, 2>) -> Self::Posture {
             posture + step
@@ -238,14 +301,19 @@ mod tests {
             to - from
         }
 
-        fn information(&self, t: usize, posture: &Self::Posture) -> (SMatrix<f64, 2, 2>, SVector<f64, 2>) {
-            let Some((first, sum)) = self.seen[t] else { return (SMatrix::zeros(), SVector::zeros()) };
+        fn information(
+            &self,
+            observation: &Self::Observation,
+            _interval_s: f64,
+            posture: &Self::Posture,
+        ) -> (SMatrix<f64, 2, 2>, SVector<f64, 2>) {
+            let Some((first, sum)) = *observation else { return (SMatrix::zeros(), SVector::zeros()) };
             let j = SMatrix::<f64, 2, 2>::new(1.0, 0.0, 1.0, 1.0);
             let residual = SVector::<f64, 2>::new(first, sum) - j * posture;
             (j.transpose() * j / self.noise, j.transpose() * residual / self.noise)
         }
 
-        fn acceleration_density(&self, _t: usize) -> SVector<f64, 2> {
+        fn acceleration_density(&self) -> SVector<f64, 2> {
             SVector::repeat(self.density)
         }
     }
@@ -253,14 +321,18 @@ mod tests {
     const SETTINGS: RateSettings =
         RateSettings { rate_decay_s: 0.8, initial_sd: 2.0, initial_rate_sd: 1.5, iterations: 1 };
 
-    fn model() -> Line {
+    /// Twelve frames, of which three are not seen.
+    fn observations() -> Vec<Option<(f64, f64)>> {
         let value = |t: usize| (t as f64 * 0.4).sin();
-        let seen = (0..12).map(|t| (!(5..8).contains(&t)).then(|| (value(t), value(t) + 0.1 * t as f64))).collect();
-        Line { seen, density: 0.7, noise: 0.05 }
+        (0..12).map(|t| (!(5..8).contains(&t)).then(|| (value(t), value(t) + 0.1 * t as f64))).collect()
     }
 
     /// The same model solved as one least-squares problem over all frames: the exact posterior of a linear model.
-    fn batch(model: &Line, intervals: &[f64]) -> Vec<(SVector<f64, 2>, SMatrix<f64, 2, 2>)> {
+    fn batch(
+        model: &Line,
+        seen: &[Option<(f64, f64)>],
+        intervals: &[f64],
+    ) -> Vec<(SVector<f64, 2>, SMatrix<f64, 2, 2>)> {
         let n = intervals.len();
         let mut information = DMatrix::<f64>::zeros(4 * n, 4 * n);
         let mut gradient = DVector::<f64>::zeros(4 * n);
@@ -269,7 +341,7 @@ mod tests {
             information[(2 + d, 2 + d)] += 1.0 / SETTINGS.initial_rate_sd.powi(2);
         }
         for t in 0..n {
-            let (h, g) = model.information(t, &SVector::zeros());
+            let (h, g) = model.information(&seen[t], 0.0, &SVector::zeros());
             for i in 0..2 {
                 gradient[4 * t + i] += g[i];
                 for j in 0..2 {
@@ -309,16 +381,18 @@ mod tests {
 
     #[test]
     fn the_smoother_is_the_least_squares_solution_over_all_frames_also_through_a_gap() {
-        let model = model();
+        let (model, seen) = (Line { density: 0.7, noise: 0.05 }, observations());
         let intervals: Vec<f64> = (0..12).map(|t| if t == 0 { 0.0 } else { 0.03 + 0.01 * (t % 3) as f64 }).collect();
         let mut filter = RateFilter::new(SVector::zeros(), SETTINGS);
-        for (t, interval) in intervals.iter().enumerate() {
-            filter.step(&model, t, *interval);
+        let mut history = RateHistory::with_capacity(12);
+        for (observation, interval) in seen.iter().zip(&intervals) {
+            filter.step(&model, observation, *interval);
+            history.push(&filter);
         }
         let mut smoothed = Vec::new();
-        filter.smooth(&model, |frame| smoothed.push(frame));
+        history.smooth(&model, |frame| smoothed.push(frame));
         smoothed.reverse();
-        for (t, (mean, covariance)) in batch(&model, &intervals).into_iter().enumerate() {
+        for (t, (mean, covariance)) in batch(&model, &seen, &intervals).into_iter().enumerate() {
             assert!((smoothed[t].posture - mean).norm() < 1e-9, "frame {t}");
             assert!((smoothed[t].covariance - covariance).norm() < 1e-9, "covariance of frame {t}");
         }
@@ -326,11 +400,11 @@ mod tests {
 
     #[test]
     fn an_unseen_posture_comes_to_rest_and_its_uncertainty_stays_bounded_in_rate() {
-        let model = Line { seen: vec![Some((0.0, 0.0)), Some((0.1, 0.1)), None], density: 0.5, noise: 1e-6 };
+        let model = Line { density: 0.5, noise: 1e-6 };
         let mut filter = RateFilter::new(SVector::zeros(), SETTINGS);
-        filter.step(&model, 0, 0.0);
-        filter.step(&model, 1, 0.1);
-        let after = filter.step(&model, 2, 100.0);
+        filter.step(&model, &Some((0.0, 0.0)), 0.0);
+        filter.step(&model, &Some((0.1, 0.1)), 0.1);
+        let after = filter.step(&model, &None, 100.0);
         assert!(after.rate.norm() < 1e-12);
         // One metre per second decaying over 0.8 s goes on by at most 0.8.
         assert!(after.posture[0] < 0.1 + 1.2 * SETTINGS.rate_decay_s);

@@ -132,14 +132,19 @@ fn measure_static(observations: &Observations, frames: &[usize]) -> (Skeleton, V
     (skeleton.clone(), with_lengths(segments, &skeleton))
 }
 
-/// Median lengths over frames of a moving subject.
+/// Share of a moving subject's frames, those in which a leg is straightest, in which its segments are measured. A sensor
+/// sees a bent leg from its end and misplaces the joint behind; the straighter half shows the segments at their length.
+const STRAIGHTER_SHARE: f64 = 0.5;
+
+/// Median lengths over frames of a moving subject; those of a leg over the frames in which it is straighter.
 fn measure_moving(observations: &Observations, frames: &[usize]) -> (Skeleton, Vec<SegmentLength>) {
     let lengths = |limb: Limb, level: usize| {
         let of = |t: &usize| {
             let points = &observations.points[*t];
             (points[point_index(limb, level)] - points[point_index(limb, level - 1)]).norm()
         };
-        let mut all: Vec<f64> = frames.iter().map(of).collect();
+        let measured = if limb.is_arm() { frames } else { &straighter_frames(observations, frames, limb)[..] };
+        let mut all: Vec<f64> = measured.iter().map(of).collect();
         let median = median(&mut all);
         let mut deviations: Vec<f64> = all.iter().map(|l| (l - median).abs()).collect();
         // 1.4826 makes the median absolute deviation a standard deviation for a normal distribution.
@@ -163,6 +168,18 @@ fn measure_moving(observations: &Observations, frames: &[usize]) -> (Skeleton, V
     let skeleton =
         Skeleton { offsets, proximal: Limb::ALL.map(|l| length(l, 0)), distal: Limb::ALL.map(|l| length(l, 1)) };
     (skeleton, segments)
+}
+
+/// The frames in which a limb is straightest, in no particular order.
+fn straighter_frames(observations: &Observations, frames: &[usize], limb: Limb) -> Vec<usize> {
+    let flexion = |t: &usize| {
+        let at = |level| &observations.points[*t][point_index(limb, level)];
+        flexion_of_three_points(at(0), at(1), at(2))
+    };
+    let mut ordered: Vec<(f64, usize)> = frames.iter().map(|t| (flexion(t), *t)).collect();
+    ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let kept = (ordered.len() as f64 * STRAIGHTER_SHARE).ceil() as usize;
+    ordered.into_iter().take(kept).map(|(_, t)| t).collect()
 }
 
 fn with_lengths(mut segments: Vec<SegmentLength>, skeleton: &Skeleton) -> Vec<SegmentLength> {

@@ -24,7 +24,8 @@ use calibration::{Calibration, calibrate};
 use noise_model::NoiseModel;
 use observation::{ALL_SEEN, Observations};
 use posterior::{Posterior, SeriesBuilder};
-use state_space::Tuning;
+use sensor_noise::SensorNoise;
+use state_space::{StateSpace, Tuning};
 
 /// Fewest frames of a recording that can be assessed.
 const MIN_FRAMES: usize = 2;
@@ -51,7 +52,7 @@ pub fn assess(
     let calibration = calibrate(&mut observations)?;
     let mut quality = observations_quality(&observations, &calibration);
     let mut builder = SeriesBuilder::new(observations.len());
-    let emit = |posterior: &Posterior| builder.push(posterior);
+    let emit = |posterior: &Posterior| builder.push(&posterior.summarize());
     match settings.method {
         Method::Particle => {
             let noise = NoiseModel::nite_table1();
@@ -59,7 +60,11 @@ pub fn assess(
                 particle::run(&observations, &calibration, noise, settings.particles, settings.seed, monitor, emit)?;
             quality.effective_sample_size = Some(sizes);
         }
-        Method::Iekf => iekf::run(&observations, &calibration, &Tuning::default(), pass, monitor, emit)?,
+        Method::Iekf => {
+            let noise = SensorNoise::of(&observations);
+            let model = StateSpace::new(&calibration.skeleton, &noise, &Tuning::default());
+            iekf::run(&observations, model, pass, monitor, |summary| builder.push(summary))?;
+        }
         Method::Ik => run_closed_geometry(&observations, &calibration, monitor, emit)?,
         Method::Nite => middleware::run(skeleton, &observations, &calibration, monitor, emit)?,
     }

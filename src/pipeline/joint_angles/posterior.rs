@@ -6,11 +6,12 @@ use crate::assessment::{AngleChannel, Series};
 use crate::body::anatomical_angles::{
     ANGLE_COUNT, Angles, angle_jacobian, angles_of_pose, arm_offset, leg_offset, unobservable_angles,
 };
-use crate::body::pose::{POSE_DIMENSION, Pose, PoseVector, attitude_offset};
+use crate::body::pose::{POSE_DIMENSION, Pose, PoseVector, attitude_offset, hinge_offset};
+use crate::body::range_of_motion::RangeOfMotion;
 use crate::body::skeleton::point_index;
 use crate::body::{Limb, Side};
 use crate::geometry::attitude::left_jacobian;
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// Covariance of the error vector of a pose, rad².
 pub type PoseCovariance = SMatrix<f64, POSE_DIMENSION, POSE_DIMENSION>;
@@ -29,6 +30,39 @@ pub struct Posterior {
     pub seen: SeenMask,
     /// Flags that concern every angle of a limb, by limb.
     pub limb_flags: [u8; 4],
+}
+
+impl Posterior {
+    /// What the series need of this posterior, a tenth of its size.
+    pub fn summarize(&self) -> Summary {
+        let spread = self.covariance.as_ref().map(|covariance| Spread {
+            angles: angle_sd(&self.pose, covariance),
+            attitudes: std::array::from_fn(|i| covariance.fixed_view::<3, 3>(3 * i, 3 * i).into_owned()),
+        });
+        Summary { pose: self.pose.clone(), spread, seen: self.seen, limb_flags: self.limb_flags }
+    }
+}
+
+/// A posterior without the correlations between joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// Posture.
+    pub pose: Pose,
+    /// How uncertain it is; `None` when the method does not say.
+    pub spread: Option<Spread>,
+    /// Points the estimate rests on.
+    pub seen: SeenMask,
+    /// Flags that concern every angle of a limb, by limb.
+    pub limb_flags: [u8; 4],
+}
+
+/// Uncertainty of a posture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spread {
+    /// Standard deviation of each anatomical angle, radians.
+    pub angles: Angles,
+    /// Covariance of the error vector of trunk, left and right shoulder, left and right hip, rad².
+    pub attitudes: [Matrix3<f64>; 5],
 }
 
 /// Collects posteriors into the series of an assessment.
@@ -60,26 +94,31 @@ impl SeriesBuilder {
     }
 
     /// Adds the next frame.
-    pub fn push(&mut self, posterior: &Posterior) {
-        let (mut angles, singular) = angles_of_pose(&posterior.pose);
+    pub fn push(&mut self, frame: &Summary) {
+        let (mut angles, singular) = angles_of_pose(&frame.pose);
         if !self.is_first {
             unwrap_angles(&mut angles, &self.previous_angles);
         }
-        let unobservable = unobservable_angles(&posterior.pose);
-        let sd = posterior.covariance.as_ref().map(|c| angle_sd(&posterior.pose, c));
+        let unobservable = unobservable_angles(&frame.pose);
+        let hinges = hinge_bounds();
         for angle in 0..ANGLE_COUNT {
-            let mut flags = dependency_flags(angle, posterior);
+            let mut flags = dependency_flags(angle, frame);
             flags |= if singular[angle] { FLAG_SINGULAR } else { 0 };
             flags |= if unobservable[angle] { FLAG_NOT_OBSERVABLE } else { 0 };
-            self.append(angle, angles[angle], sd.map(|sd| sd[angle]), flags);
+            let mut bounds = interval(angles[angle], frame.spread.as_ref().map(|spread| spread.angles[angle]));
+            if let Some((_, range)) = hinges.iter().find(|(hinge, _)| *hinge == angle) {
+                bounds = within(bounds, angles[angle], *range);
+            }
+            self.append(angle, angles[angle], bounds, flags);
         }
-        let theta = posterior.pose.to_vector(&self.previous);
+        let theta = frame.pose.to_vector(&self.previous);
         for joint in 0..5 {
             let attitude = theta.fixed_rows::<3>(3 * joint).into_owned();
-            let sd = posterior.covariance.as_ref().map(|c| attitude_sd(&attitude, c, 3 * joint));
-            let flags = dependency_flags(first_angle_of_joint(joint), posterior);
+            let sd = frame.spread.as_ref().map(|spread| attitude_sd(&attitude, &spread.attitudes[joint]));
+            let flags = dependency_flags(first_angle_of_joint(joint), frame);
             for axis in 0..3 {
-                self.append(ANGLE_COUNT + 3 * joint + axis, attitude[axis], sd.map(|sd| sd[axis]), flags);
+                let bounds = interval(attitude[axis], sd.map(|sd| sd[axis]));
+                self.append(ANGLE_COUNT + 3 * joint + axis, attitude[axis], bounds, flags);
             }
         }
         self.previous = theta;
@@ -92,14 +131,36 @@ impl SeriesBuilder {
         self.series
     }
 
-    fn append(&mut self, channel: usize, value: f64, sd: Option<f64>, flags: u8) {
+    fn append(&mut self, channel: usize, value: f64, [low, high]: [f64; 2], flags: u8) {
         let series = &mut self.series[channel];
-        let half = sd.map_or(f64::NAN, |sd| Z95 * sd);
         series.value.push(value.to_degrees() as f32);
-        series.low.push((value - half).to_degrees() as f32);
-        series.high.push((value + half).to_degrees() as f32);
+        series.low.push(low.to_degrees() as f32);
+        series.high.push(high.to_degrees() as f32);
         series.flags.push(flags);
     }
+}
+
+/// The 95 % interval of a value; NaN without a standard deviation.
+fn interval(value: f64, sd: Option<f64>) -> [f64; 2] {
+    let half = sd.map_or(f64::NAN, |sd| Z95 * sd);
+    [value - half, value + half]
+}
+
+/// An interval cut off at a range, but never at the value itself; an absent one stays absent.
+fn within([low, high]: [f64; 2], value: f64, [least, most]: [f64; 2]) -> [f64; 2] {
+    if low.is_nan() {
+        return [low, high];
+    }
+    [low.max(least.min(value)), high.min(most.max(value))]
+}
+
+/// Each hinge's place among the angles and its range of motion, radians: an interval does not leave it.
+fn hinge_bounds() -> [(usize, [f64; 2]); 4] {
+    let range = RangeOfMotion::healthy_adult();
+    Limb::ALL.map(|limb| {
+        let hinge = hinge_offset(limb.index());
+        (limb_angles(limb).start + 3, [range.low[hinge], range.high[hinge]])
+    })
 }
 
 /// Brings each angle to the turn nearest to the previous frame's, within ±360°.
@@ -124,9 +185,8 @@ fn angle_sd(pose: &Pose, covariance: &PoseCovariance) -> Angles {
     })
 }
 
-/// Standard deviation of an attitude vector's components, radians.
-fn attitude_sd(attitude: &Vector3<f64>, covariance: &PoseCovariance, offset: usize) -> Vector3<f64> {
-    let block = covariance.fixed_view::<3, 3>(offset, offset).into_owned();
+/// Standard deviation of an attitude vector's components, radians, from the covariance of its error vector.
+fn attitude_sd(attitude: &Vector3<f64>, block: &Matrix3<f64>) -> Vector3<f64> {
     // The error acts on the left: exp(v + δv) = exp(J δv) exp(v). At a full turn J is singular and says nothing.
     match left_jacobian(attitude).try_inverse() {
         Some(inverse) => (inverse * block * inverse.transpose()).diagonal().map(|v| v.max(0.0).sqrt()),
@@ -146,7 +206,7 @@ fn first_angle_of_joint(joint: usize) -> usize {
 }
 
 /// Flags of an angle by the points it depends on: the trunk's roots, and the limb's points up to the one that shows it.
-fn dependency_flags(angle: usize, posterior: &Posterior) -> u8 {
+fn dependency_flags(angle: usize, posterior: &Summary) -> u8 {
     let trunk_seen = sees_trunk(posterior.seen);
     let bridged = |is_seen: bool| if is_seen { 0 } else { FLAG_BRIDGED };
     let Some(limb) = Limb::ALL.into_iter().find(|limb| limb_angles(*limb).contains(&angle)) else {
@@ -187,7 +247,7 @@ mod tests {
     fn series_of(posteriors: &[Posterior], channel: &str) -> Series {
         let mut builder = SeriesBuilder::new(posteriors.len());
         for posterior in posteriors {
-            builder.push(posterior);
+            builder.push(&posterior.summarize());
         }
         builder.finish().into_iter().find(|s| s.channel == channel).expect("the channel")
     }
@@ -197,6 +257,15 @@ mod tests {
         let series = series_of(&[posterior(Pose::reference(), ALL_SEEN)], "left_knee_flexion_deg");
         assert!((series.high[0] - series.low[0] - 2.0 * 1.96 * 0.573).abs() < 0.01);
         assert_eq!(series.flags, [0]);
+    }
+
+    #[test]
+    fn the_interval_of_a_straight_knee_ends_at_its_range_of_motion() {
+        let frame =
+            Posterior { covariance: Some(PoseCovariance::identity()), ..posterior(Pose::reference(), ALL_SEEN) };
+        let series = series_of(&[frame], "left_knee_flexion_deg");
+        assert_eq!(series.low[0], -10.0);
+        assert!((series.high[0] - 112.3).abs() < 0.1, "{}", series.high[0]);
     }
 
     #[test]

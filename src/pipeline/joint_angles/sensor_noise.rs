@@ -8,8 +8,25 @@ use crate::body::skeleton::point_index;
 use crate::body::{Limb, POINT_COUNT};
 use nalgebra::Vector3;
 
+/// How far the sensor is off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorNoise {
+    /// Standard deviation of each point's white noise in the axes of the observations, metres.
+    pub white: [Vector3<f64>; POINT_COUNT],
+    /// Standard deviation of the offset of a point's coordinates that outlasts averaging, metres.
+    pub slow_offset: f64,
+}
+
+impl SensorNoise {
+    /// The noise that a recording shows by itself.
+    pub fn of(observations: &Observations) -> Self {
+        let white = white_noise(observations);
+        Self { white, slow_offset: slow_offset(observations, &white) }
+    }
+}
+
 /// Standard deviation of each point's white noise in the axes of the observations, metres.
-pub fn white_noise(observations: &Observations) -> [Vector3<f64>; POINT_COUNT] {
+fn white_noise(observations: &Observations) -> [Vector3<f64>; POINT_COUNT] {
     let mut noise = [Vector3::zeros(); POINT_COUNT];
     let mut differences = Vec::with_capacity(observations.len());
     for (p, sd) in noise.iter_mut().enumerate() {
@@ -43,7 +60,7 @@ const OFFSET_PER_LENGTH_CHANGE: f64 = 5.0;
 
 /// Standard deviation of the offset of a point's coordinates that outlasts averaging, metres, from how much the bones
 /// seem to change in length between blocks of time.
-pub fn slow_offset(observations: &Observations, white: &[Vector3<f64>; POINT_COUNT]) -> f64 {
+fn slow_offset(observations: &Observations, white: &[Vector3<f64>; POINT_COUNT]) -> f64 {
     let interval = observations.duration_s() / (observations.len().max(2) - 1) as f64;
     let frames = ((BLOCK_S / interval.max(1e-3)).round() as usize).clamp(1, 1000);
     let mut variances = Vec::with_capacity(8);
@@ -57,8 +74,12 @@ pub fn slow_offset(observations: &Observations, white: &[Vector3<f64>; POINT_COU
             let n = lengths.len() as f64;
             let mean = lengths.iter().sum::<f64>() / n;
             let observed = lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0);
-            let expected = (white[a].norm_squared() + white[b].norm_squared()) / 3.0 / frames as f64;
-            variances.push((observed - expected).max(0.0));
+            // A median of n normal numbers has π/2 of the variance of their mean.
+            let per_frame = (white[a].norm_squared() + white[b].norm_squared()) / 3.0;
+            let expected = std::f64::consts::FRAC_PI_2 * per_frame / frames as f64;
+            // Two standard errors of a variance: what white noise alone may look like.
+            let chance = 2.0 * (2.0 / (n - 1.0)).sqrt();
+            variances.push((observed - expected * (1.0 + chance)).max(0.0));
         }
     }
     // The median: a hand that a sensor hardly sees must not speak for the body.
@@ -68,14 +89,20 @@ pub fn slow_offset(observations: &Observations, white: &[Vector3<f64>; POINT_COU
     OFFSET_PER_LENGTH_CHANGE * (variance / 2.0).sqrt()
 }
 
-/// Distance of two points' mean positions in each block of frames in which both were mostly seen, metres.
+/// Median distance of two points in each block of frames in which both were mostly seen, metres. The distance is taken
+/// frame by frame: the mean positions of a turning bone are closer together than its ends.
 fn block_lengths(observations: &Observations, frames: usize, a: usize, b: usize) -> Vec<f64> {
-    let length = |block: &[[Vector3<f64>; POINT_COUNT]]| {
-        let both: Vec<_> = block.iter().filter(|p| p[a].x.is_finite() && p[b].x.is_finite()).collect();
-        let sum: Vector3<f64> = both.iter().map(|p| p[b] - p[a]).sum();
-        (2 * both.len() > block.len()).then(|| (sum / both.len() as f64).norm())
+    let mut lengths = Vec::with_capacity(frames);
+    let mut length = |block: &[[Vector3<f64>; POINT_COUNT]]| {
+        lengths.clear();
+        lengths.extend(block.iter().map(|points| (points[b] - points[a]).norm()).filter(|length| length.is_finite()));
+        if 2 * lengths.len() <= block.len() {
+            return None;
+        }
+        let middle = lengths.len() / 2;
+        Some(*lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
     };
-    observations.points.chunks_exact(frames).filter_map(length).collect()
+    observations.points.chunks_exact(frames).filter_map(&mut length).collect()
 }
 
 #[cfg(test)]
@@ -113,6 +140,19 @@ mod tests {
         let points = (0..900).map(&mut frame).collect();
         let time_ns = (0..900).map(|t| t * 33_333_333).collect();
         Observations { time_ns, points, subject_from_world: Rotation3::identity() }
+    }
+
+    #[test]
+    fn a_bone_that_turns_quickly_shows_no_offset() {
+        let frame = |t: usize| {
+            let direction = Rotation3::from_axis_angle(&Vector3::z_axis(), (t as f64 / 5.0).sin());
+            std::array::from_fn(|p| direction * Vector3::new((p / 3) as f64, -0.4 * (p % 3) as f64, 2.0))
+        };
+        let points = (0..900).map(frame).collect();
+        let time_ns = (0..900).map(|t| t * 33_333_333).collect();
+        let observations = Observations { time_ns, points, subject_from_world: Rotation3::identity() };
+        let white = [Vector3::zeros(); POINT_COUNT];
+        assert!(slow_offset(&observations, &white) < 1e-9);
     }
 
     #[test]

@@ -1,21 +1,31 @@
 //! The state-space model that the Gaussian methods share: posture and rates as the state, twelve points as the
 //! observation, a Student-t weight for each point.
 //!
+//! ```text
+//! y = K(θ) + r + s₁ d₁ + s₂ d₂ + e
+//! ```
+//!
+//! K is the skeleton of constant lengths. A sensor does not see a body of constant lengths: it misplaces the root of a
+//! limb (r, common to its three points) and lets segments seem longer or shorter along their directions d (s, common to
+//! all points beyond). These slacks have the size of the sensor's slow offset and are marginalised in every frame; e is
+//! white noise and what else of the offset is each point's own, smaller at the roots than at hands and feet.
+//!
 //! What joint centres cannot show, the twist of a straight limb, is held by a weak prior at zero twist
 //! ([`Tuning::twist_sd`]). Two errors make the interval: white noise, which the passes average, and the sensor's slow
 //! offset, which stays as long as the posture does and is carried into the angles by one frame's geometry.
 
-use super::calibration::Calibration;
 use super::inverse_kinematics::pose_from_points;
-use super::observation::{ALL_SEEN, Observations};
+use super::observation::{ALL_SEEN, Observations, seen_mask};
 use super::posterior::{PoseCovariance, Posterior};
-use super::sensor_noise::{slow_offset, white_noise};
+use super::sensor_noise::SensorNoise;
 use crate::assessment::series::FLAG_OUTLIER;
-use crate::body::kinematics::{forward_kinematics, forward_kinematics_with_jacobian};
+use crate::body::kinematics::{Points, forward_kinematics, forward_kinematics_with_jacobian};
 use crate::body::pose::{POSE_DIMENSION, PoseVector, attitude_offset, hinge_offset};
+use crate::body::range_of_motion::RangeOfMotion;
 use crate::body::skeleton::point_index;
 use crate::body::{Limb, POINT_COUNT, Pose, Skeleton};
 use crate::estimation::rate_smoother::{RateModel, RateSettings};
+use crate::estimation::truncated_normal::truncated_mean;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// What can be tuned, each with the measurement that set it in `docs/measurements.md`.
@@ -25,6 +35,13 @@ pub struct Tuning {
     /// noise, metres. Between the two it is the recording's own slow offset; the bound keeps a bad sensor from losing
     /// its weight against the dynamics, the floor a perfect one from having infinite weight.
     pub model_sd: [f64; 2],
+    /// Share of that error at the root, the middle and the end of a limb: depth sensors place shoulders and hips better
+    /// than hands and feet (20 to 56 mm in the recordings of UI-PRMD).
+    pub level_share: [f64; 3],
+    /// Standard deviation of a limb's common displacement against the trunk, as a share of the slow offset.
+    pub root_slack: f64,
+    /// Standard deviation of the change of a segment's apparent length, as a share of the slow offset.
+    pub length_slack: f64,
     /// Degrees of freedom of the Student-t weight of a point: with 6 a point that is 5 standard deviations off has a
     /// fifth of its weight left, one that is 20 off a fiftieth.
     pub student_t_dof: f64,
@@ -45,11 +62,14 @@ impl Default for Tuning {
     fn default() -> Self {
         Self {
             model_sd: [0.005, 0.025],
+            level_share: [0.4, 1.0, 1.6],
+            root_slack: 0.25,
+            length_slack: 0.5,
             student_t_dof: 6.0,
-            twist_sd: 10f64.to_radians(),
+            twist_sd: 6f64.to_radians(),
             twist_time_s: 1.0 / 30.0,
             trunk_density: 3.0,
-            limb_density: 10.0,
+            limb_density: 6.0,
             rates: RateSettings { rate_decay_s: 0.7, initial_sd: 0.5, initial_rate_sd: 1.0, iterations: 3 },
         }
     }
@@ -59,36 +79,86 @@ impl Default for Tuning {
 const UNSEEN_SD: f64 = std::f64::consts::FRAC_PI_3;
 /// Weight under which a point counts as an outlier of its frame.
 const OUTLIER_WEIGHT: f64 = 0.25;
+/// Least offset of a point that an interval allows for, metres: a person is not a linked skeleton, whatever the sensor.
+const LEAST_OFFSET: f64 = 0.003;
+/// Slack whose inverse square is still far from overflow, metres.
+const LEAST_SLACK: f64 = 1e-5;
 
 /// One subject seen by one sensor.
-#[derive(Debug)]
-pub struct StateSpace<'a> {
-    observations: &'a Observations,
-    skeleton: &'a Skeleton,
-    tuning: &'a Tuning,
+#[derive(Debug, Clone)]
+pub struct StateSpace {
+    skeleton: Skeleton,
+    tuning: Tuning,
+    range: RangeOfMotion,
     /// Inverse variance of each point's coordinates, m⁻².
     precision: [Vector3<f64>; POINT_COUNT],
     /// Offset of a point's coordinates that no averaging over time takes away, metres.
     slow_offset: f64,
+    /// Inverse variances of a limb's slacks: displacement of the root (3), length of the two segments, m⁻².
+    slack_precision: SVector<f64, SLACKS>,
 }
 
-impl<'a> StateSpace<'a> {
-    /// The model of a calibrated subject; its noise is estimated from the observations.
-    pub fn new(observations: &'a Observations, calibration: &'a Calibration, tuning: &'a Tuning) -> Self {
-        let skeleton = &calibration.skeleton;
-        let white = white_noise(observations);
-        let slow_offset = slow_offset(observations, &white);
-        let model_variance = slow_offset.clamp(tuning.model_sd[0], tuning.model_sd[1]).powi(2);
-        let precision = white.map(|white| white.map(|sd| 1.0 / (sd.powi(2) + model_variance)));
-        Self { observations, skeleton, tuning, precision, slow_offset }
+/// Slacks of a limb.
+const SLACKS: usize = 5;
+/// What a limb's points depend on: trunk (3), limb attitude (3), hinge (1).
+const LIMB_DIMENSION: usize = 7;
+
+type LimbInformation = SMatrix<f64, LIMB_DIMENSION, LIMB_DIMENSION>;
+type LimbVector = SVector<f64, LIMB_DIMENSION>;
+
+impl StateSpace {
+    /// The model of a calibrated subject and a sensor.
+    pub fn new(skeleton: &Skeleton, noise: &SensorNoise, tuning: &Tuning) -> Self {
+        let slow_offset = noise.slow_offset.max(LEAST_OFFSET);
+        let model_sd = slow_offset.clamp(tuning.model_sd[0], tuning.model_sd[1]);
+        let precision = std::array::from_fn(|p| {
+            let share = tuning.level_share[p % 3];
+            noise.white[p].map(|sd| 1.0 / (sd.powi(2) + (share * model_sd).powi(2)))
+        });
+        let [root, length] =
+            [tuning.root_slack, tuning.length_slack].map(|share| (share * noise.slow_offset).max(LEAST_SLACK).powi(-2));
+        Self {
+            skeleton: skeleton.clone(),
+            tuning: tuning.clone(),
+            range: RangeOfMotion::healthy_adult(),
+            precision,
+            slow_offset,
+            slack_precision: SVector::from([root, root, root, length, length]),
+        }
     }
 
-    /// Posture of the first complete frame by closed geometry.
-    pub fn initial_pose(&self) -> Pose {
-        let complete = (0..self.observations.len()).find(|t| self.observations.seen(*t) == ALL_SEEN);
+    /// Posture of the first complete frame by closed geometry: where the passes start.
+    pub fn initial_pose(&self, observations: &Observations) -> Pose {
+        let complete = (0..observations.len()).find(|t| observations.seen(*t) == ALL_SEEN);
         complete.map_or_else(Pose::reference, |t| {
-            pose_from_points(self.skeleton, &self.observations.points[t], &Pose::reference())
+            pose_from_points(&self.skeleton, &observations.points[t], &Pose::reference())
         })
+    }
+
+    /// Settings of the passes.
+    pub fn rate_settings(&self) -> RateSettings {
+        self.tuning.rates
+    }
+
+    /// What is known of a frame, from the estimate of a pass: hinges become the means of their distributions cut off at
+    /// the range of motion, the sensor's offset has its part in the covariance, outliers are flagged.
+    pub fn posterior(&self, observed: &Points, mut pose: Pose, covariance: &PoseCovariance) -> Posterior {
+        let points = forward_kinematics(&self.skeleton, &pose);
+        let limb_flags = Limb::ALL.map(|limb| {
+            let is_outlier = (0..3).map(|level| point_index(limb, level)).any(|p| {
+                let residual = observed[p] - points[p];
+                residual.x.is_finite() && self.weight(p, &residual) < OUTLIER_WEIGHT
+            });
+            if is_outlier { FLAG_OUTLIER } else { 0 }
+        });
+        let offset = self.offset_covariance(observed, &pose);
+        for limb in Limb::ALL {
+            let hinge = hinge_offset(limb.index());
+            let sd = covariance[(hinge, hinge)].max(0.0).sqrt();
+            let bounds = [self.range.low[hinge], self.range.high[hinge]];
+            pose.hinges[limb.index()] = truncated_mean(pose.hinges[limb.index()], sd, bounds);
+        }
+        Posterior { pose, covariance: Some(covariance + offset), seen: seen_mask(observed), limb_flags }
     }
 
     /// Student-t weight of a residual of three coordinates: 1 and a little at zero, falling with its squared length.
@@ -97,31 +167,14 @@ impl<'a> StateSpace<'a> {
         (self.tuning.student_t_dof + 3.0) / (self.tuning.student_t_dof + distance)
     }
 
-    /// Estimate of frame `t` with the offset's part in its covariance and outliers flagged.
-    pub fn posterior(&self, t: usize, pose: Pose, covariance: PoseCovariance) -> Posterior {
-        let points = forward_kinematics(self.skeleton, &pose);
-        let observed = &self.observations.points[t];
-        let limb_flags = Limb::ALL.map(|limb| {
-            let is_outlier = (0..3).map(|level| point_index(limb, level)).any(|p| {
-                let residual = observed[p] - points[p];
-                residual.x.is_finite() && self.weight(p, &residual) < OUTLIER_WEIGHT
-            });
-            if is_outlier { FLAG_OUTLIER } else { 0 }
-        });
-        let covariance = Some(covariance + self.offset_covariance(t, &pose));
-        Posterior { pose, covariance, seen: self.observations.seen(t), limb_flags }
-    }
-}
-
-impl StateSpace<'_> {
     /// What an offset of the sensor that outlasts the smoothing does to a posture, rad²: the covariance of one frame's
     /// estimate from points that are each off by the slow offset, with the twist prior.
-    fn offset_covariance(&self, t: usize, pose: &Pose) -> PoseCovariance {
-        let (_, jacobian) = forward_kinematics_with_jacobian(self.skeleton, pose);
-        let seen = self.observations.seen(t);
+    fn offset_covariance(&self, observed: &Points, pose: &Pose) -> PoseCovariance {
+        let (_, jacobian) = forward_kinematics_with_jacobian(&self.skeleton, pose);
+        let seen = seen_mask(observed);
         // A joint that is not seen is known to this at most; it also keeps the matrix invertible.
         let mut information = PoseCovariance::identity() / UNSEEN_SD.powi(2);
-        let precision = 1.0 / self.slow_offset.powi(2).max(1e-8);
+        let precision = self.slow_offset.powi(-2);
         for p in (0..POINT_COUNT).filter(|p| seen >> p & 1 == 1) {
             let rows = jacobian.fixed_rows::<3>(3 * p);
             information.gemm_tr(precision, &rows, &rows, 1.0);
@@ -136,8 +189,9 @@ impl StateSpace<'_> {
     }
 }
 
-impl RateModel<POSE_DIMENSION> for StateSpace<'_> {
+impl RateModel<POSE_DIMENSION> for StateSpace {
     type Posture = Pose;
+    type Observation = Points;
 
     fn moved(&self, posture: &Pose, step: &PoseVector) -> Pose {
         posture.perturbed(step)
@@ -147,12 +201,11 @@ impl RateModel<POSE_DIMENSION> for StateSpace<'_> {
         to.error_from(from)
     }
 
-    fn information(&self, t: usize, pose: &Pose) -> (PoseCovariance, PoseVector) {
+    fn information(&self, observed: &Points, interval_s: f64, pose: &Pose) -> (PoseCovariance, PoseVector) {
         let mut information = PoseCovariance::zeros();
         let mut gradient = PoseVector::zeros();
-        let interval = self.observations.interval_s(t).max(1e-3);
         for limb in Limb::ALL {
-            let (limb_information, limb_gradient) = self.limb_information(t, pose, limb, interval);
+            let (limb_information, limb_gradient) = self.limb_information(observed, pose, limb, interval_s.max(1e-3));
             let a = attitude_offset(limb.index());
             let columns = [0, 1, 2, a, a + 1, a + 2, hinge_offset(limb.index())];
             for (i, row) in columns.into_iter().enumerate() {
@@ -165,39 +218,44 @@ impl RateModel<POSE_DIMENSION> for StateSpace<'_> {
         (information, gradient)
     }
 
-    fn acceleration_density(&self, _t: usize) -> PoseVector {
+    fn acceleration_density(&self) -> PoseVector {
         PoseVector::from_fn(|i, _| if i < 3 { self.tuning.trunk_density } else { self.tuning.limb_density })
     }
 }
 
-impl StateSpace<'_> {
-    /// Information and gradient of one limb with respect to trunk (3), limb attitude (3) and hinge (1).
+impl StateSpace {
+    /// Information and gradient of one limb with respect to trunk (3), limb attitude (3) and hinge (1), its slacks
+    /// marginalised.
     fn limb_information(
         &self,
-        t: usize,
+        observed: &Points,
         pose: &Pose,
         limb: Limb,
         interval_s: f64,
-    ) -> (SMatrix<f64, 7, 7>, SVector<f64, 7>) {
+    ) -> (LimbInformation, LimbVector) {
         let i = limb.index();
         let trunk: &Matrix3<f64> = pose.trunk.matrix();
         let (sine, cosine) = pose.hinges[i].sin_cos();
         let (along, flexed) = (limb.reference_direction(), limb.flexed_direction());
-        let proximal = pose.limbs[i] * along * self.skeleton.proximal[i];
-        let distal = pose.limbs[i] * (along * cosine + flexed * sine) * self.skeleton.distal[i];
+        let directions = [pose.limbs[i] * along, pose.limbs[i] * (along * cosine + flexed * sine)];
         let swing = pose.limbs[i] * (flexed * cosine - along * sine) * self.skeleton.distal[i];
         let root = pose.trunk * self.skeleton.offsets[i];
-        let reach = [Vector3::zeros(), proximal, proximal + distal];
-        let mut information = SMatrix::zeros();
-        let mut gradient = SVector::zeros();
+        let middle = directions[0] * self.skeleton.proximal[i];
+        let reach = [Vector3::zeros(), middle, middle + directions[1] * self.skeleton.distal[i]];
+        let stretch = directions.map(|direction| trunk * direction);
+        let mut information = LimbInformation::zeros();
+        let mut gradient = LimbVector::zeros();
+        let mut slack = SMatrix::<f64, SLACKS, SLACKS>::from_diagonal(&self.slack_precision);
+        let mut slack_gradient = SVector::<f64, SLACKS>::zeros();
+        let mut cross = SMatrix::<f64, LIMB_DIMENSION, SLACKS>::zeros();
         for (level, reach) in reach.into_iter().enumerate() {
             let p = point_index(limb, level);
             let point = root + trunk * reach;
-            let residual = self.observations.points[t][p] - point;
+            let residual = observed[p] - point;
             if !residual.x.is_finite() {
                 continue;
             }
-            let mut jacobian = SMatrix::<f64, 3, 7>::zeros();
+            let mut jacobian = SMatrix::<f64, 3, LIMB_DIMENSION>::zeros();
             jacobian.fixed_columns_mut::<3>(0).copy_from(&-point.cross_matrix());
             if level > 0 {
                 jacobian.fixed_columns_mut::<3>(3).copy_from(&(-trunk * reach.cross_matrix()));
@@ -205,13 +263,23 @@ impl StateSpace<'_> {
             if level == 2 {
                 jacobian.fixed_columns_mut::<1>(6).copy_from(&(trunk * swing));
             }
-            let precision = self.precision[p] * self.weight(p, &residual);
-            let mut weighted = jacobian;
-            for (axis, mut row) in weighted.row_iter_mut().enumerate() {
-                row *= precision[axis];
+            let mut by_slack = SMatrix::<f64, 3, SLACKS>::identity();
+            for (segment, direction) in stretch.iter().enumerate().take(level) {
+                by_slack.set_column(3 + segment, direction);
             }
-            information += weighted.transpose() * jacobian;
-            gradient += weighted.transpose() * residual;
+            let precision = self.precision[p] * self.weight(p, &residual);
+            let weighted = scaled_rows(&jacobian, &precision).transpose();
+            information += weighted * jacobian;
+            gradient += weighted * residual;
+            cross += weighted * by_slack;
+            let weighted = scaled_rows(&by_slack, &precision).transpose();
+            slack += weighted * by_slack;
+            slack_gradient += weighted * residual;
+        }
+        // The slacks' prior makes their block positive definite.
+        if let Some(factor) = slack.cholesky() {
+            information -= cross * factor.solve(&cross.transpose());
+            gradient -= cross * factor.solve(&slack_gradient);
         }
         self.add_twist_prior(pose, limb, interval_s, &mut information, &mut gradient);
         (information, gradient)
@@ -224,8 +292,8 @@ impl StateSpace<'_> {
         pose: &Pose,
         limb: Limb,
         interval_s: f64,
-        information: &mut SMatrix<f64, 7, 7>,
-        gradient: &mut SVector<f64, 7>,
+        information: &mut LimbInformation,
+        gradient: &mut LimbVector,
     ) {
         let axis = pose.limbs[limb.index()] * limb.reference_direction();
         let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.limbs[limb.index()]);
@@ -241,37 +309,78 @@ impl StateSpace<'_> {
     }
 }
 
+/// A matrix with each row multiplied by the factor of its axis.
+fn scaled_rows<const N: usize>(matrix: &SMatrix<f64, 3, N>, factors: &Vector3<f64>) -> SMatrix<f64, 3, N> {
+    SMatrix::from_fn(|row, column| matrix[(row, column)] * factors[row])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assessment::quality::CalibrationQuality;
-    use nalgebra::Rotation3;
+    use nalgebra::DMatrix;
+
+    /// The covariance of a limb's three points as it is written in the module's documentation.
+    fn limb_covariance(model: &StateSpace, pose: &Pose, limb: Limb, observed: &Points) -> DMatrix<f64> {
+        let points = forward_kinematics(&model.skeleton, pose);
+        let at = |level| points[point_index(limb, level)];
+        let direction = |level| (at(level) - at(level - 1)).normalize();
+        DMatrix::from_fn(9, 9, |row, column| {
+            let ((a, i), (b, j)) = ((row / 3, row % 3), (column / 3, column % 3));
+            let mut covariance = if i == j { 1.0 / model.slack_precision[0] } else { 0.0 };
+            for segment in 1..=a.min(b) {
+                covariance += direction(segment)[i] * direction(segment)[j] / model.slack_precision[2 + segment];
+            }
+            if row == column {
+                let p = point_index(limb, a);
+                covariance += 1.0 / (model.precision[p][i] * model.weight(p, &(observed[p] - points[p])));
+            }
+            covariance
+        })
+    }
 
     #[test]
-    fn the_information_is_that_of_the_full_jacobian() {
+    fn the_information_is_that_of_the_full_covariance_of_each_limb() {
         let skeleton = Skeleton::of_stature(1.7);
         let truth = Pose::from_vector(&PoseVector::from_fn(|i, _| 0.1 * (i as f64).sin() + 0.2));
-        let points = forward_kinematics(&skeleton, &truth);
-        let observations =
-            Observations { time_ns: vec![0], points: vec![points], subject_from_world: Rotation3::identity() };
-        let tuning = Tuning::default();
-        let quality = CalibrationQuality { source: "test".into(), window_s: None, n_frames: 1, segments: Vec::new() };
-        let calibration = Calibration { skeleton: skeleton.clone(), quality, warnings: Vec::new() };
-        let model = StateSpace::new(&observations, &calibration, &tuning);
-        let (_, jacobian) = forward_kinematics_with_jacobian(&skeleton, &truth);
-        let (information, gradient) = model.information(0, &truth);
-        let mut expected = PoseCovariance::zeros();
-        for p in 0..POINT_COUNT {
-            let rows = jacobian.fixed_rows::<3>(3 * p);
-            // At a residual of zero the Student-t weight is (ν + 3) / ν.
-            let weight = (tuning.student_t_dof + 3.0) / tuning.student_t_dof;
-            let precision = Matrix3::from_diagonal(&(model.precision[p] * weight));
-            expected += rows.transpose() * precision * rows;
+        let mut observed = forward_kinematics(&skeleton, &truth);
+        for (p, point) in observed.iter_mut().enumerate() {
+            *point += Vector3::new(0.01, -0.02, 0.015) * (p as f64).cos();
         }
-        let difference = information - expected;
-        // The rest is the twist prior, whose interval is the least one for the first frame.
-        let prior = 1e-3 / (tuning.twist_time_s * tuning.twist_sd.powi(2));
-        assert!(difference.amax() <= prior * 1.001, "{}", difference.amax());
-        assert!(gradient.amax() <= prior, "{}", gradient.amax());
+        let noise = SensorNoise { white: [Vector3::new(0.01, 0.02, 0.03); POINT_COUNT], slow_offset: 0.04 };
+        let model = StateSpace::new(&skeleton, &noise, &Tuning { twist_sd: 1e6, ..Tuning::default() });
+        let (_, jacobian) = forward_kinematics_with_jacobian(&skeleton, &truth);
+        let points = forward_kinematics(&skeleton, &truth);
+        let (information, gradient) = model.information(&observed, 0.0, &truth);
+        let (mut expected, mut expected_gradient) = (PoseCovariance::zeros(), PoseVector::zeros());
+        for limb in Limb::ALL {
+            let inverse = limb_covariance(&model, &truth, limb, &observed).try_inverse().expect("positive definite");
+            let rows = jacobian.fixed_rows::<9>(9 * limb.index()).into_owned();
+            let residual = SVector::<f64, 9>::from_fn(|row, _| {
+                let p = 3 * limb.index() + row / 3;
+                (observed[p] - points[p])[row % 3]
+            });
+            expected += rows.transpose() * &inverse * rows;
+            expected_gradient += rows.transpose() * &inverse * residual;
+        }
+        let scale = expected.amax();
+        assert!((information - expected).amax() < 1e-9 * scale, "{}", (information - expected).amax() / scale);
+        assert!((gradient - expected_gradient).amax() < 1e-9 * expected_gradient.amax());
+    }
+
+    #[test]
+    fn a_knee_near_its_limit_is_the_mean_of_what_the_range_of_motion_leaves() {
+        let skeleton = Skeleton::of_stature(1.7);
+        let noise = SensorNoise { white: [Vector3::repeat(0.01); POINT_COUNT], slow_offset: 0.0 };
+        let model = StateSpace::new(&skeleton, &noise, &Tuning::default());
+        let at = |degrees: f64| {
+            let mut pose = Pose::reference();
+            pose.hinges[2] = degrees.to_radians();
+            let observed = forward_kinematics(&skeleton, &pose);
+            let covariance = PoseCovariance::identity() * 5f64.to_radians().powi(2);
+            model.posterior(&observed, pose, &covariance).pose.hinges[2].to_degrees()
+        };
+        assert!((at(40.0) - 40.0).abs() < 1e-9, "far from the limit nothing changes");
+        // At the limit of −10° half of a normal distribution is left, whose mean is √(2/π) of its SD.
+        assert!((at(-10.0) - (-10.0 + 5.0 * 0.79788)).abs() < 1e-3, "{}", at(-10.0));
     }
 }
