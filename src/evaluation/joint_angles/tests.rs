@@ -36,7 +36,7 @@ fn raw_joints_without_noise_agree_with_the_truth_exactly() {
 #[test]
 fn there_is_a_line_for_both_sides_together_and_for_each() {
     let sources = [trial(Exercise::SideHip, Preset::Table1, 1)];
-    let contenders = [Contender::Raw, Contender::Method(Method::Ik)];
+    let contenders = [Contender::Raw, Contender::of(Method::Ik)];
     let evaluation = evaluate(&sources, &contenders, &settings(), || ());
     let measures = |method: &str| {
         let rows = evaluation.rows.iter().filter(|r| r.method == method);
@@ -60,8 +60,8 @@ fn a_trial_that_cannot_be_loaded_or_assessed_is_reported_and_the_others_count() 
         Ok(Trial { dataset: "simulated".into(), exercise: "step".into(), recording })
     });
     let sources = [broken, one_frame, trial(Exercise::Step, Preset::Clean, 2)];
-    let evaluation = evaluate(&sources, &[Contender::Method(Method::Ik)], &settings(), || ());
-    let told: Vec<_> = evaluation.failures.iter().map(|f| (f.trial.as_str(), f.method)).collect();
+    let evaluation = evaluate(&sources, &[Contender::of(Method::Ik)], &settings(), || ());
+    let told: Vec<_> = evaluation.failures.iter().map(|f| (f.trial.as_str(), f.method.as_deref())).collect();
     assert_eq!(told, [("broken", None), ("one frame", Some("ik"))]);
     assert_eq!(evaluation.failures[0].reason, "the file is empty");
     let knee = row(&evaluation, Exercise::Step, "ik", "knee_flexion");
@@ -82,7 +82,7 @@ fn the_result_is_the_same_with_one_and_with_several_threads() {
 #[test]
 fn the_default_s_intervals_are_counted_against_the_truth() {
     let sources = [trial(Exercise::BackKnee, Preset::Table1, 1)];
-    let evaluation = evaluate(&sources, &[Contender::Method(Method::Iekf)], &settings(), || ());
+    let evaluation = evaluate(&sources, &[Contender::of(Method::Iekf)], &settings(), || ());
     let knee = row(&evaluation, Exercise::BackKnee, "iekf", "knee_flexion");
     let inside = knee.interval_coverage.expect("the default has intervals");
     assert!(inside > 0.5 && inside <= 1.0, "{inside}");

@@ -1,0 +1,88 @@
+//! Every method over all exercises of a data set: the error of each angle, and whether the intervals hold what they
+//! promise.
+
+use super::contender::Contender;
+use super::joint_angles::MEASURES;
+use super::rows::{Groups, Row};
+use serde::Serialize;
+use std::ops::RangeInclusive;
+
+/// Share of 95 % intervals that should hold the reference: the promise, give or take what a few dozen recordings with
+/// correlated frames can show.
+pub const PROMISED_COVERAGE: RangeInclusive<f64> = 0.90..=0.98;
+
+/// One method in one angle over all exercises of a data set, both sides together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OverviewRow {
+    /// Where the trials come from.
+    pub dataset: String,
+    /// The contender.
+    pub method: String,
+    /// The angle, without side.
+    pub measure: &'static str,
+    /// Exercises with the angle.
+    pub n_exercises: usize,
+    /// Mean over the exercises of the median mean absolute error over trials, degrees.
+    pub mae_deg: Option<f64>,
+    /// Mean over the exercises of the median root mean square error over trials, degrees.
+    pub rmse_deg: Option<f64>,
+    /// Share of the samples of all exercises whose 95 % interval holds the reference; absent without intervals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval_coverage: Option<f64>,
+    /// Whether that share lies in [`PROMISED_COVERAGE`]; absent without intervals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval_coverage_as_promised: Option<bool>,
+}
+
+/// Rows in the order of data set, contender, measure.
+pub(super) fn overview(rows: &[Row], groups: &Groups<'_>, contenders: &[Contender]) -> Vec<OverviewRow> {
+    let mut datasets: Vec<&str> = groups.keys().map(|(dataset, _)| *dataset).collect();
+    datasets.dedup();
+    let mut found = Vec::new();
+    for dataset in datasets {
+        for (i, contender) in contenders.iter().enumerate() {
+            let method = contender.name();
+            for (measure, _) in MEASURES {
+                let own: Vec<&Row> = rows
+                    .iter()
+                    .filter(|r| r.dataset == dataset && r.method == method && r.measure == measure)
+                    .collect();
+                if own.is_empty() {
+                    continue;
+                }
+                let interval_coverage = coverage(groups, dataset, i, measure);
+                found.push(OverviewRow {
+                    dataset: dataset.to_owned(),
+                    method: method.clone(),
+                    measure,
+                    n_exercises: own.len(),
+                    mae_deg: mean(own.iter().filter_map(|row| row.mae_deg)),
+                    rmse_deg: mean(own.iter().filter_map(|row| row.rmse_deg)),
+                    interval_coverage,
+                    interval_coverage_as_promised: interval_coverage.map(|share| PROMISED_COVERAGE.contains(&share)),
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Share of a contender's intervals that hold the reference, over all samples of a data set.
+fn coverage(groups: &Groups<'_>, dataset: &str, contender: usize, measure: &str) -> Option<f64> {
+    let (mut with_interval, mut held) = (0, 0);
+    for ((_, _), trials) in groups.iter().filter(|((own, _), _)| *own == dataset) {
+        for compared in trials.iter().filter_map(|trial| trial.results[contender].as_ref().ok()) {
+            for comparison in compared.comparisons.iter().filter(|c| c.measure == measure) {
+                let (all, inside) = comparison.held_by_intervals();
+                with_interval += all;
+                held += inside;
+            }
+        }
+    }
+    (with_interval > 0).then(|| held as f64 / with_interval as f64)
+}
+
+fn mean(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let n = values.clone().count();
+    (n > 0).then(|| values.sum::<f64>() / n as f64)
+}
