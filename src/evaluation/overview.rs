@@ -2,8 +2,8 @@
 //! promise.
 
 use super::contender::Contender;
-use super::joint_angles::MEASURES;
-use super::rows::{Groups, Row};
+use super::joint_angles::{MEASURES, TrialOutcome};
+use super::rows::{Row, Sets};
 use serde::Serialize;
 use std::ops::RangeInclusive;
 
@@ -35,24 +35,23 @@ pub struct OverviewRow {
 }
 
 /// Rows in the order of data set, contender, measure.
-pub(super) fn overview(rows: &[Row], groups: &Groups<'_>, contenders: &[Contender]) -> Vec<OverviewRow> {
-    let mut datasets: Vec<&str> = groups.keys().map(|(dataset, _)| *dataset).collect();
-    datasets.dedup();
+pub(super) fn overview(rows: &[Row], sets: &Sets<'_>, contenders: &[Contender]) -> Vec<OverviewRow> {
     let mut found = Vec::new();
-    for dataset in datasets {
+    for (dataset, exercises) in sets {
+        let Some((_, all)) = exercises.last() else { continue };
         for (i, contender) in contenders.iter().enumerate() {
             let method = contender.name();
             for (measure, _) in MEASURES {
                 let own: Vec<&Row> = rows
                     .iter()
-                    .filter(|r| r.dataset == dataset && r.method == method && r.measure == measure)
+                    .filter(|r| r.dataset == *dataset && r.method == method && r.measure == measure)
                     .collect();
                 if own.is_empty() {
                     continue;
                 }
-                let interval_coverage = coverage(groups, dataset, i, measure);
+                let interval_coverage = coverage(all, i, measure);
                 found.push(OverviewRow {
-                    dataset: dataset.to_owned(),
+                    dataset: (*dataset).to_owned(),
                     method: method.clone(),
                     measure,
                     n_exercises: own.len(),
@@ -67,16 +66,14 @@ pub(super) fn overview(rows: &[Row], groups: &Groups<'_>, contenders: &[Contende
     found
 }
 
-/// Share of a contender's intervals that hold the reference, over all samples of a data set.
-fn coverage(groups: &Groups<'_>, dataset: &str, contender: usize, measure: &str) -> Option<f64> {
+/// Share of a contender's intervals that hold the reference, over all samples of the trials.
+fn coverage(trials: &[&TrialOutcome], contender: usize, measure: &str) -> Option<f64> {
     let (mut with_interval, mut held) = (0, 0);
-    for ((_, _), trials) in groups.iter().filter(|((own, _), _)| *own == dataset) {
-        for compared in trials.iter().filter_map(|trial| trial.results[contender].as_ref().ok()) {
-            for comparison in compared.comparisons.iter().filter(|c| c.measure == measure) {
-                let (all, inside) = comparison.held_by_intervals();
-                with_interval += all;
-                held += inside;
-            }
+    for compared in trials.iter().filter_map(|trial| trial.results[contender].as_ref().ok()) {
+        for comparison in compared.comparisons.iter().filter(|c| c.measure == measure) {
+            let (all, inside) = comparison.held_by_intervals();
+            with_interval += all;
+            held += inside;
         }
     }
     (with_interval > 0).then(|| held as f64 / with_interval as f64)

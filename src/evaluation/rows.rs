@@ -96,9 +96,10 @@ pub(super) fn summarize(outcomes: &[TrialOutcome], contenders: &[Contender]) -> 
             }
         }
     }
-    evaluation.errors = error_rows(&groups, contenders);
-    evaluation.verdict = verdict(&groups, contenders);
-    evaluation.segment_lengths = segment_lengths(&groups, contenders);
+    let sets = sets(&groups);
+    evaluation.errors = error_rows(&sets, contenders);
+    evaluation.verdict = verdict(&sets, contenders);
+    evaluation.segment_lengths = segment_lengths(&sets, contenders);
     for ((dataset, exercise), trials) in &groups {
         for (i, contender) in contenders.iter().enumerate() {
             let n_failed = trials.iter().filter(|trial| trial.results[i].is_err()).count();
@@ -116,26 +117,38 @@ pub(super) fn summarize(outcomes: &[TrialOutcome], contenders: &[Contender]) -> 
             }
         }
     }
-    evaluation.overview = overview(&evaluation.rows, &groups, contenders);
+    evaluation.overview = overview(&evaluation.rows, &sets, contenders);
     evaluation
 }
 
 /// Trials by data set and exercise.
-pub(super) type Groups<'a> = BTreeMap<(&'a str, &'a str), Vec<&'a TrialOutcome>>;
+type Groups<'a> = BTreeMap<(&'a str, &'a str), Vec<&'a TrialOutcome>>;
 
-/// The paper's error analysis of every data set: each side, each exercise and all of them, each method.
-fn error_rows(groups: &Groups<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
-    let baseline = contenders.iter().position(|contender| *contender == Contender::MIDDLEWARE);
-    let mut sets: BTreeMap<&str, Vec<(&str, Vec<&TrialOutcome>)>> = BTreeMap::new();
+/// Exercise of the lines that take all exercises of a data set together.
+pub const ALL_EXERCISES: &str = "all";
+
+/// Exercises of each data set with their trials; all of them together come last.
+pub(super) type Sets<'a> = BTreeMap<&'a str, Vec<(&'a str, Vec<&'a TrialOutcome>)>>;
+
+pub(super) fn sets<'a>(groups: &Groups<'a>) -> Sets<'a> {
+    let mut sets = Sets::new();
     for ((dataset, exercise), trials) in groups {
         sets.entry(dataset).or_default().push((exercise, trials.clone()));
     }
-    let mut rows = Vec::new();
-    for (dataset, mut exercises) in sets {
+    for exercises in sets.values_mut() {
         let all = exercises.iter().flat_map(|(_, trials)| trials.iter().copied()).collect();
-        exercises.push(("all", all));
+        exercises.push((ALL_EXERCISES, all));
+    }
+    sets
+}
+
+/// The paper's error analysis of every data set: each side, each exercise and all of them, each method.
+fn error_rows(sets: &Sets<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
+    let baseline = contenders.iter().position(|contender| *contender == Contender::MIDDLEWARE);
+    let mut rows = Vec::new();
+    for (dataset, exercises) in sets {
         for side in Side::BOTH {
-            for (exercise, trials) in &exercises {
+            for (exercise, trials) in exercises {
                 for (i, contender) in contenders.iter().enumerate() {
                     let mut found = Vec::new();
                     for trial in trials {
@@ -151,7 +164,7 @@ fn error_rows(groups: &Groups<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
                         continue;
                     }
                     let mut row = error_row(&contender.name(), side, &found);
-                    row.dataset = dataset.to_owned();
+                    row.dataset = (*dataset).to_owned();
                     row.exercise = (*exercise).to_owned();
                     rows.push(row);
                 }

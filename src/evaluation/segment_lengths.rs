@@ -6,7 +6,7 @@
 
 use super::agreement::median;
 use super::contender::Contender;
-use super::rows::Groups;
+use super::rows::Sets;
 use crate::assessment::{AngleChannel, Assessment};
 use crate::body::kinematics::forward_kinematics;
 use crate::body::pose::{PoseVector, attitude_offset, hinge_offset};
@@ -33,18 +33,16 @@ pub struct SegmentLengths {
 const MM_PER_M: f64 = 1000.0;
 
 /// One line for each data set; none when the default was left out.
-pub(super) fn segment_lengths(groups: &Groups<'_>, contenders: &[Contender]) -> Vec<SegmentLengths> {
+pub(super) fn segment_lengths(sets: &Sets<'_>, contenders: &[Contender]) -> Vec<SegmentLengths> {
     let Some(default) = contenders.iter().position(|contender| contender.is_default()) else { return Vec::new() };
     let mut found: Vec<SegmentLengths> = Vec::new();
-    let mut datasets: Vec<&str> = groups.keys().map(|(dataset, _)| *dataset).collect();
-    datasets.dedup();
-    for dataset in datasets {
-        let trials = || groups.iter().filter(|((own, _), _)| *own == dataset).flat_map(|(_, trials)| trials);
-        let recorded: Vec<f64> = trials().filter_map(|trial| trial.recorded_length_deviation_m).collect();
-        let output = trials().filter_map(|trial| trial.results[default].as_ref().ok()?.length_deviation_m);
+    for (dataset, exercises) in sets {
+        let Some((_, trials)) = exercises.last() else { continue };
+        let recorded: Vec<f64> = trials.iter().filter_map(|trial| trial.recorded_length_deviation_m).collect();
+        let output = trials.iter().filter_map(|trial| trial.results[default].as_ref().ok()?.length_deviation_m);
         found.push(SegmentLengths {
-            dataset: dataset.to_owned(),
-            n_trials: trials().count(),
+            dataset: (*dataset).to_owned(),
+            n_trials: trials.len(),
             recorded_deviation_mm: median(&recorded).map(|deviation| deviation * MM_PER_M),
             method: contenders[default].name(),
             output_deviation_mm: output.reduce(f64::max).map(|deviation| deviation * MM_PER_M),

@@ -3,11 +3,10 @@
 use super::agreement::{Agreement, median};
 use super::contender::Contender;
 use super::joint_angles::{MEASURES, TrialOutcome};
-use super::rows::{Groups, agreement_in_trial};
+use super::rows::{ALL_EXERCISES, Sets, agreement_in_trial};
 use super::signed_rank::signed_rank;
 use crate::body::Side;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Largest median difference that counts as none, degrees: less than the second decimal of the tables can tell.
 pub const CLOSE_DEG: f64 = 0.05;
@@ -22,8 +21,8 @@ pub const TESTABLE_FROM: usize = 6;
 pub const RULE: &str = "Each trial gives one error for both sides together; the difference is the default's error less \
     the other's, and its median over the trials decides. It is a tie within 0.05 degrees, and when Wilcoxon's \
     signed-rank test over six or more trials has p >= 0.05. With fewer than six trials no test can be significant: then \
-    the median alone decides, and the row says `untested`. A trial that only the default could not compare loses the \
-    row.";
+    it is a tie unless all trials have the same sign, and the row says `untested`. A trial that only the default could \
+    not compare loses the row.";
 
 /// Error of a trial that is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -77,7 +76,7 @@ pub enum Ground {
     NotSignificant,
     /// The test sees a difference.
     Significant,
-    /// Too few trials for the test.
+    /// Too few trials for the test: their signs decide.
     Untested,
     /// The default has no number where the other has one.
     Missing,
@@ -127,12 +126,13 @@ pub fn judge(default: &[Option<f64>], against: &[Option<f64>]) -> Option<Judgeme
     let p = signed_rank(&differences).map(|test| test.p);
     let difference = difference_deg.unwrap_or(0.0);
     let by_sign = if difference < 0.0 { Outcome::Beats } else { Outcome::Loses };
+    let same_sign = differences.iter().all(|d| *d < 0.0) || differences.iter().all(|d| *d > 0.0);
     let (outcome, ground) = if missing {
         (Outcome::Loses, Ground::Missing)
     } else if difference.abs() <= CLOSE_DEG {
         (Outcome::Ties, Ground::Close)
     } else if pairs.len() < TESTABLE_FROM {
-        (by_sign, Ground::Untested)
+        (if same_sign { by_sign } else { Outcome::Ties }, Ground::Untested)
     } else if p.is_none_or(|p| p >= SIGNIFICANCE) {
         (Outcome::Ties, Ground::NotSignificant)
     } else {
@@ -205,24 +205,15 @@ impl Verdict {
     }
 }
 
-/// Exercise of the rows that take all exercises of a data set together.
-pub const ALL_EXERCISES: &str = "all";
-
-/// The verdict over all groups; none when the default or every other contender was left out.
-pub(super) fn verdict(groups: &Groups<'_>, contenders: &[Contender]) -> Option<Verdict> {
+/// The verdict over all data sets; none when the default or every other contender was left out.
+pub(super) fn verdict(sets: &Sets<'_>, contenders: &[Contender]) -> Option<Verdict> {
     let default = contenders.iter().position(|contender| contender.is_default())?;
     if contenders.len() < 2 {
         return None;
     }
     let mut rows = Vec::new();
-    let mut sets: BTreeMap<&str, Vec<(&str, Vec<&TrialOutcome>)>> = BTreeMap::new();
-    for ((dataset, exercise), trials) in groups {
-        sets.entry(dataset).or_default().push((exercise, trials.clone()));
-    }
-    for (dataset, mut exercises) in sets {
-        let all = exercises.iter().flat_map(|(_, trials)| trials.iter().copied()).collect();
-        exercises.push((ALL_EXERCISES, all));
-        for (exercise, trials) in &exercises {
+    for (dataset, exercises) in sets {
+        for (exercise, trials) in exercises {
             for (measure, _) in MEASURES {
                 let agreements: Vec<Vec<Option<Agreement>>> =
                     (0..contenders.len()).map(|contender| agreements(trials, contender, measure)).collect();
@@ -233,7 +224,7 @@ pub(super) fn verdict(groups: &Groups<'_>, contenders: &[Contender]) -> Option<V
                         };
                         let Some(judgement) = judge(&errors(default), &errors(i)) else { continue };
                         rows.push(VerdictRow {
-                            dataset: dataset.to_owned(),
+                            dataset: (*dataset).to_owned(),
                             exercise: (*exercise).to_owned(),
                             measure,
                             statistic,
@@ -318,6 +309,8 @@ mod tests {
     fn too_few_trials_do_not_hide_a_loss_behind_the_test() {
         assert_eq!(outcome(&[7.0, 8.0, 9.0], &[6.0, 7.0, 8.0]), (Outcome::Loses, Ground::Untested));
         assert_eq!(outcome(&[6.0], &[7.0]), (Outcome::Beats, Ground::Untested));
+        let mixed = outcome(&[7.0, 8.0, 1.0], &[6.0, 7.0, 8.0]);
+        assert_eq!(mixed, (Outcome::Ties, Ground::Untested), "the trials disagree");
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! The verdict for people: every row, the score against each other method, and every loss.
 
 use super::table::number;
-use crate::evaluation::verdict::{ALL_EXERCISES, Outcome, Statistic, Verdict, VerdictRow};
+use crate::evaluation::rows::ALL_EXERCISES;
+use crate::evaluation::verdict::{Outcome, Statistic, Verdict, VerdictRow};
 use std::io::{self, Write};
 
 /// Width of the rule's lines, characters.

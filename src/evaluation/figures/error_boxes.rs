@@ -15,9 +15,12 @@ const AXIS: (f64, f64) = (0.08, 200.0);
 const LOW: f64 = 0.1;
 const HIGH: f64 = 180.0;
 
-/// Height of one chart and of the exercises' names below it, pixels.
-const HEIGHT: u32 = 250;
-const NAMES: f64 = 52.0;
+/// Height of one chart without the exercises' names, and of one line of the names, pixels.
+const HEIGHT: u32 = 205;
+const LINE: u32 = 14;
+
+/// Mean width of a letter, pixels.
+const LETTER: f64 = 6.6;
 
 /// Whisker, box, median, box, whisker.
 const SHARES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -42,11 +45,13 @@ pub(super) fn draw(dataset: &str, exercises: &Exercises<'_>, contenders: &[Conte
         .map(|contender| (contender.name(), Mark::Band(colour_of(*contender, contenders).into())))
         .collect();
     let title = format!("{dataset}: absolute errors of each method (box: quartiles; whiskers: 5 to 95 %)");
-    let names: Vec<&str> = exercises.keys().copied().collect();
-    sheet(&title, &legend, HEIGHT * charts.len() as u32, |area| {
+    let most = (0.9 * f64::from(WIDTH - 74) / exercises.len() as f64 / LETTER) as usize;
+    let names: Vec<Vec<String>> = exercises.keys().map(|exercise| broken(exercise, most)).collect();
+    let height = HEIGHT + LINE * names.iter().map(Vec::len).max().unwrap_or(1) as u32;
+    sheet(&title, &legend, height * charts.len() as u32, |area| {
         for (i, (name, boxes)) in charts.iter().enumerate() {
-            let top = px(f64::from(HEIGHT * i as u32));
-            let own = area.clone().shrink((0, top), (px(f64::from(WIDTH)) as u32, px(f64::from(HEIGHT)) as u32));
+            let top = px(f64::from(height * i as u32));
+            let own = area.clone().shrink((0, top), (px(f64::from(WIDTH)) as u32, px(f64::from(height)) as u32));
             panel(&own, name, &names, boxes, contenders)?;
         }
         Ok(())
@@ -57,22 +62,23 @@ pub(super) fn draw(dataset: &str, exercises: &Exercises<'_>, contenders: &[Conte
 fn panel(
     area: &Area<'_>,
     name: &str,
-    exercises: &[&str],
+    exercises: &[Vec<String>],
     boxes: &[Vec<Option<[f64; 5]>>],
     contenders: &[Contender],
 ) -> Drawn {
+    let below = px(f64::from(LINE * exercises.iter().map(Vec::len).max().unwrap_or(1) as u32) + 8.0);
     let mut chart = ChartBuilder::on(area)
         .margin_top(px(8.0))
         .margin_right(px(12.0))
         .margin_left(px(22.0))
-        .x_label_area_size(px(NAMES))
+        .x_label_area_size(below)
         .y_label_area_size(px(40.0))
         .build_cartesian_2d(0.0..exercises.len() as f64, (AXIS.0..AXIS.1).log_scale())?;
     let mut mesh = chart.configure_mesh();
     mesh.disable_x_mesh().label_style(label()).axis_style(colour::INK.mix(0.6)).x_labels(0).y_labels(5);
     mesh.bold_line_style(colour::GRID.stroke_width(px(0.5) as u32)).light_line_style(TRANSPARENT);
     mesh.y_label_formatter(&|v| format!("{v}")).draw()?;
-    vertical_name(area, &format!("{name}: error (°)"), px((f64::from(HEIGHT) - NAMES) / 2.0))?;
+    vertical_name(area, &format!("{name}: error (°)"), px(f64::from(HEIGHT) / 2.0))?;
 
     // The methods of an exercise share four fifths of its width.
     let step = 0.8 / contenders.len() as f64;
@@ -101,10 +107,8 @@ fn panel(
     let origin = area.get_base_pixel();
     for (i, exercise) in exercises.iter().enumerate() {
         let (x, y) = chart.backend_coord(&(i as f64 + 0.5, AXIS.0));
-        // Letters are about 6.6 pixels wide.
-        let most = (0.9 * f64::from(WIDTH - 74) / exercises.len() as f64 / 6.6) as usize;
-        for (line, part) in broken(exercise, most).iter().enumerate() {
-            word_below(area, part, (x - origin.0, y - origin.1 + px(3.0 + 14.0 * line as f64)))?;
+        for (line, part) in exercise.iter().enumerate() {
+            word_below(area, part, (x - origin.0, y - origin.1 + px(3.0 + f64::from(LINE) * line as f64)))?;
         }
     }
     Ok(())

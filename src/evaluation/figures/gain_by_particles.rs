@@ -5,7 +5,7 @@ use super::{Drawn, colour};
 use crate::body::Side;
 use crate::evaluation::contender::Contender;
 use crate::evaluation::error_analysis::{ErrorRow, Gain};
-use crate::evaluation::verdict::ALL_EXERCISES;
+use crate::evaluation::rows::ALL_EXERCISES;
 use plotters::prelude::*;
 
 /// Height of one chart, pixels.
@@ -52,8 +52,9 @@ pub(super) fn draw(dataset: &str, errors: &[ErrorRow]) -> Drawn<Option<String>> 
         (joint.3)(row.0)
     };
     let default = own.iter().find(|(_, contender)| contender.is_default()).map(|(row, _)| row.method.clone());
+    let has_gain = |joint: &&Joint| own.iter().any(|(row, _)| row.side == joint.1 && (joint.3)(row).is_some());
     let legend: Vec<(String, Mark)> =
-        JOINTS.iter().map(|(name, _, line, _)| ((*name).to_owned(), Mark::Line(*line))).collect();
+        JOINTS.iter().filter(has_gain).map(|(name, _, line, _)| ((*name).to_owned(), Mark::Line(*line))).collect();
     let title = format!("{dataset}: error of nite less error of the method, mean and standard error over frames");
     sheet(&title, &legend, HEIGHT * charts.len() as u32, |area| {
         for (i, (name, counts)) in charts.iter().enumerate() {

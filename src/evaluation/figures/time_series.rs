@@ -96,7 +96,9 @@ fn panel(
         .axis_style(colour::INK.mix(0.6))
         .bold_line_style(colour::GRID.stroke_width(px(0.5) as u32));
     mesh.light_line_style(TRANSPARENT).x_labels(11).y_labels(5).y_label_formatter(&|v| format!("{v:.0}"));
-    let time_label = |v: &f64| if has_time_axis { format!("{v:.0}") } else { String::new() };
+    // Ticks of short trials lie between whole seconds.
+    let digits = usize::from(end < 10.0);
+    let time_label = |v: &f64| if has_time_axis { format!("{v:.digits$}") } else { String::new() };
     mesh.x_label_formatter(&time_label);
     if has_time_axis {
         mesh.x_desc("time (s)").axis_desc_style(label());

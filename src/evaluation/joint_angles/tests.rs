@@ -105,3 +105,46 @@ fn full_turns_are_no_error() {
         assert!((rmse(a) - rmse(b)).abs() < 1e-3, "{} {:?}", a.measure, a.side);
     }
 }
+
+#[test]
+fn a_method_has_particles_exactly_when_its_assessment_tells_an_effective_sample_size() {
+    let recording = (trial(Exercise::BackKnee, Preset::Table1, 1).load)().unwrap().recording;
+    for method in Method::ALL {
+        let own = JointAngleSettings { method, ..settings() };
+        let assessment = pipeline::assess(&recording, &Settings::JointAngles(own), &Monitor::default()).unwrap();
+        assert_eq!(method.has_particles(), assessment.quality.effective_sample_size.is_some(), "{method}");
+    }
+}
+
+#[test]
+fn the_overview_takes_the_exercises_of_a_data_set_together() {
+    let sources = [trial(Exercise::Step, Preset::Table1, 1), trial(Exercise::SideHip, Preset::Table1, 1)];
+    let contenders = [Contender::default_method(), Contender::of(Method::Ik)];
+    let evaluation = evaluate(&sources, &contenders, &settings(), || ());
+    assert_eq!(evaluation.overview.len(), contenders.len() * MEASURES.len());
+    let knee = |method: &str| {
+        let mut rows = evaluation.overview.iter();
+        rows.find(|row| row.method == method && row.measure == "knee_flexion").unwrap()
+    };
+    let of = |exercise| row(&evaluation, exercise, "iekf", "knee_flexion");
+    let (step, side_hip) = (of(Exercise::Step), of(Exercise::SideHip));
+    let mean = (step.mae_deg.unwrap() + side_hip.mae_deg.unwrap()) / 2.0;
+    assert!(knee("iekf").n_exercises == 2 && (knee("iekf").mae_deg.unwrap() - mean).abs() < 1e-12);
+    let held = |row: &Row| row.interval_coverage.unwrap() * row.n_frames as f64;
+    let share = (held(step) + held(side_hip)) / (step.n_frames + side_hip.n_frames) as f64;
+    assert!((knee("iekf").interval_coverage.unwrap() - share).abs() < 1e-12);
+    assert_eq!((knee("ik").interval_coverage, knee("ik").interval_coverage_as_promised), (None, None));
+}
+
+#[test]
+fn the_verdict_compares_the_default_with_every_other_in_each_exercise_and_in_all() {
+    let sources = [trial(Exercise::Step, Preset::Table1, 1), trial(Exercise::SideHip, Preset::Table1, 1)];
+    let contenders = [Contender::Raw, Contender::default_method(), Contender::of(Method::Ik)];
+    let verdict = evaluate(&sources, &contenders, &settings(), || ()).verdict.unwrap();
+    // Two exercises and all; raw in the knee only, `ik` in four angles; two statistics.
+    assert_eq!(verdict.rows.len(), 3 * (1 + 4) * 2);
+    let scored: usize = verdict.scores.iter().map(|score| score.beats + score.ties + score.loses).sum();
+    assert_eq!(scored, 2 * (1 + 4) * 2, "rows of all exercises are not counted again");
+    assert_eq!(verdict.default_beats_or_ties_everywhere, verdict.losses().count() == 0);
+    assert_eq!(evaluate(&sources, &contenders[..1], &settings(), || ()).verdict, None);
+}
