@@ -116,7 +116,7 @@ pub(super) fn overview(evaluation: &Evaluation, out: &mut dyn Write) -> io::Resu
                 Some(false) => " !",
                 None => "  ",
             };
-            let interval = interval.map_or("-".to_owned(), |share| format!("{:.2}%", 100.0 * share));
+            let interval = interval.map_or("-".to_owned(), |share| format!("{:.1}%", 100.0 * share));
             line += &format!(" {:>8} |{interval:>8}{mark}", number(mae, 2));
         }
         writeln!(out, "{}", line.trim_end())?;
