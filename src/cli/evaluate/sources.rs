@@ -46,7 +46,7 @@ pub(super) fn simulated(noise: Preset, seeds: u64) -> Vec<TrialSource> {
     let mut sources = Vec::new();
     for exercise in Exercise::ALL {
         for seed in 1..=seeds {
-            sources.push(TrialSource::new(format!("{exercise}, seed {seed}"), move || {
+            sources.push(TrialSource::new(format!("simulated-{noise} {exercise}, seed {seed}"), move || {
                 let settings = SimulationSettings {
                     jitter: true,
                     // Steps that never repeat within a few subjects: heights 1.55 to 1.85 m, up to 10° to either side.

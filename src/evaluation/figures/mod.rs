@@ -63,7 +63,7 @@ pub fn draw(outcomes: &Outcomes, evaluation: &Evaluation) -> Result<Vec<Figure>,
     for (dataset, exercises) in &sets {
         for (exercise, trials) in exercises {
             let name = format!("series-{dataset}-{exercise}");
-            add(name, time_series::draw(dataset, exercise, trials[0], &outcomes.contenders))?;
+            add(name, time_series::draw(exercise, trials[0], &outcomes.contenders))?;
         }
         add(format!("scatter-{dataset}"), error_scatter::draw(dataset, exercises, &outcomes.contenders))?;
         add(format!("boxes-{dataset}"), error_boxes::draw(dataset, exercises, &outcomes.contenders))?;

@@ -17,12 +17,7 @@ const TIME_AXIS: u32 = 36;
 const BAND: f64 = 0.25;
 
 /// Draws the side of a trial that moved more; nothing when the default has no estimate in it.
-pub(super) fn draw(
-    dataset: &str,
-    exercise: &str,
-    trial: &TrialOutcome,
-    contenders: &[Contender],
-) -> Drawn<Option<String>> {
+pub(super) fn draw(exercise: &str, trial: &TrialOutcome, contenders: &[Contender]) -> Drawn<Option<String>> {
     let of = |wanted: fn(&Contender) -> bool| {
         let i = contenders.iter().position(wanted)?;
         trial.results[i].as_ref().ok().map(|compared| (contenders[i], compared))
@@ -44,7 +39,7 @@ pub(super) fn draw(
     }
     let measures: Vec<(&str, &str)> =
         MEASURE_NAMES.into_iter().filter(|(measure, _)| comparison(estimate, measure, side).is_some()).collect();
-    let title = format!("{dataset}, {exercise}: {} leg ({})", side.name(), trial.name);
+    let title = format!("{exercise}, {} leg ({})", side.name(), trial.name);
     let height = HEIGHT * measures.len() as u32 + TIME_AXIS;
     sheet(&title, &legend, height, |area| {
         for (i, (measure, name)) in measures.iter().enumerate() {
