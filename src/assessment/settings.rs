@@ -29,6 +29,11 @@ impl Method {
         matches!(self, Method::Iekf)
     }
 
+    /// True of methods whose accuracy and cost depend on a number of particles.
+    pub fn has_particles(self) -> bool {
+        matches!(self, Method::Particle)
+    }
+
     /// Name in settings, tables and provenance.
     pub fn name(self) -> &'static str {
         match self {

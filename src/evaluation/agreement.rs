@@ -104,18 +104,22 @@ pub fn normalized_cross_correlation(estimate: &[f64], reference: &[f64]) -> Opti
     (scale > 0.0).then(|| (product / scale).clamp(-1.0, 1.0))
 }
 
-/// First quartile, median and third quartile of the finite values, interpolated linearly between order statistics.
-pub fn quartiles(values: &[f64]) -> Option<[f64; 3]> {
+/// Quantiles of the finite values at shares of 0 to 1, interpolated linearly between order statistics.
+pub fn quantiles<const N: usize>(values: &[f64], shares: [f64; N]) -> Option<[f64; N]> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len().checked_sub(1)?;
-    let quantile = |share: f64| {
+    Some(shares.map(|share| {
         let place = share * last as f64;
         let (below, fraction) = (place as usize, place.fract());
         let above = (below + 1).min(last);
         sorted[below] + (sorted[above] - sorted[below]) * fraction
-    };
-    Some([quantile(0.25), quantile(0.5), quantile(0.75)])
+    }))
+}
+
+/// First quartile, median and third quartile of the finite values.
+pub fn quartiles(values: &[f64]) -> Option<[f64; 3]> {
+    quantiles(values, [0.25, 0.5, 0.75])
 }
 
 /// Median of the finite values.

@@ -93,6 +93,11 @@ impl Spread {
 pub struct Gain {
     /// Δε: positive where the middleware's error is larger.
     pub difference: Spread,
+    /// Frames compared.
+    pub n_frames: usize,
+    /// Standard error of the mean Δε over frames, degrees, as in the paper's Figure 3. Frames are not independent:
+    /// the true one is larger.
+    pub standard_error_deg: f64,
     /// Standardised rank sum of Wilcoxon's test.
     pub z: f64,
     /// Its two-sided probability.
@@ -103,7 +108,12 @@ impl Gain {
     fn of(baseline: &[f64], method: &[f64]) -> Option<Self> {
         let differences: Vec<f64> = baseline.iter().zip(method).map(|(a, b)| a - b).collect();
         let test = signed_rank(&differences)?;
-        Some(Self { difference: Spread::of(&differences)?, z: test.z, p: test.p })
+        let difference = Spread::of(&differences)?;
+        let deviations = || differences.iter().filter(|d| d.is_finite()).map(|d| (d - difference.mean_deg).powi(2));
+        let n_frames = deviations().count();
+        let variance = deviations().sum::<f64>() / n_frames.saturating_sub(1).max(1) as f64;
+        let standard_error_deg = (variance / n_frames.max(1) as f64).sqrt();
+        Some(Self { difference, n_frames, standard_error_deg, z: test.z, p: test.p })
     }
 }
 
@@ -117,7 +127,7 @@ pub struct ErrorRow {
     /// The side.
     pub side: Side,
     /// The method.
-    pub method: &'static str,
+    pub method: String,
     /// Hip flexion.
     pub hip_flexion: Option<Spread>,
     /// Hip abduction.
@@ -133,7 +143,7 @@ pub struct ErrorRow {
 }
 
 /// The row of a method from its errors in every trial of an exercise, beside the middleware's in the same trials.
-pub fn error_row(method: &'static str, side: Side, trials: &[(&FrameErrors, Option<&FrameErrors>)]) -> ErrorRow {
+pub fn error_row(method: &str, side: Side, trials: &[(&FrameErrors, Option<&FrameErrors>)]) -> ErrorRow {
     let pooled = |values: &dyn Fn(&FrameErrors) -> Vec<f64>| -> Vec<f64> {
         trials.iter().flat_map(|(own, _)| values(own)).collect()
     };
@@ -148,7 +158,7 @@ pub fn error_row(method: &'static str, side: Side, trials: &[(&FrameErrors, Opti
         dataset: String::new(),
         exercise: String::new(),
         side,
-        method,
+        method: method.to_owned(),
         hip_flexion: hip(0),
         hip_abduction: hip(1),
         hip_axial_rotation: hip(2),
@@ -176,6 +186,8 @@ mod tests {
         // Differences 2, 3, 4, 5, 6; rank sum 15 against a mean of 7.5 with variance 5 · 6 · 11 / 24 = 13.75.
         assert_eq!(gain.difference, Spread { mean_deg: 4.0, p25_deg: 3.0, p75_deg: 5.0 });
         assert!((gain.z - 7.5 / 13.75f64.sqrt()).abs() < 1e-12);
+        // Squares of −2, −1, 0, 1, 2 sum to 10; 10 / 4 / 5 = 0.5.
+        assert!(gain.n_frames == 5 && (gain.standard_error_deg - 0.5f64.sqrt()).abs() < 1e-12);
         assert_eq!(row.knee_gain, None, "no difference, no test");
         assert_eq!(row.hip_flexion, Some(Spread { mean_deg: 3.0, p25_deg: 2.0, p75_deg: 4.0 }));
     }

@@ -3,13 +3,20 @@
 pub mod agreement;
 pub mod contender;
 pub mod error_analysis;
+pub mod figures;
 pub mod joint_angles;
+pub mod overview;
 pub mod reference;
 pub mod rows;
+pub mod segment_lengths;
 pub mod signed_rank;
 pub mod three_point;
 pub mod trial;
+pub mod verdict;
 
 pub use contender::Contender;
+pub use joint_angles::{MEASURE_NAMES, Outcomes};
+pub use overview::OverviewRow;
 pub use rows::{Evaluation, Failure, Row};
 pub use trial::{Trial, TrialSource};
+pub use verdict::Verdict;

@@ -4,7 +4,9 @@ use super::agreement::{Agreement, median};
 use super::contender::Contender;
 use super::error_analysis::{ErrorRow, error_row};
 use super::joint_angles::{Comparison, MEASURES, TrialOutcome};
-use crate::assessment::Method;
+use super::overview::{OverviewRow, overview};
+use super::segment_lengths::{SegmentLengths, segment_lengths};
+use super::verdict::{Verdict, verdict};
 use crate::body::Side;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -17,8 +19,8 @@ pub struct Row {
     pub dataset: String,
     /// What was done in them.
     pub exercise: String,
-    /// The method, or `raw`.
-    pub method: &'static str,
+    /// The contender, for example `iekf`, `particle/512` or `raw`.
+    pub method: String,
     /// The angle, for example `knee_flexion` or `left_knee_flexion`.
     pub measure: String,
     /// Trials with at least one compared frame.
@@ -48,7 +50,7 @@ pub struct Failure {
     /// The trial.
     pub trial: String,
     /// The method, or nothing when the trial could not even be loaded.
-    pub method: Option<&'static str>,
+    pub method: Option<String>,
     /// Why.
     pub reason: String,
 }
@@ -59,8 +61,13 @@ pub struct Evaluation {
     /// Lines in the order of data set, exercise, contender, measure.
     pub rows: Vec<Row>,
     /// The paper's error analysis, in the order of data set, side, exercise (`all` last), method.
-    #[serde(skip)]
     pub errors: Vec<ErrorRow>,
+    /// Every method over all exercises of a data set.
+    pub overview: Vec<OverviewRow>,
+    /// Whether the default beats the others; none when the default or every other contender was left out.
+    pub verdict: Option<Verdict>,
+    /// How constant the body's segments are, in each data set.
+    pub segment_lengths: Vec<SegmentLengths>,
     /// What could not be evaluated.
     pub failures: Vec<Failure>,
     /// Trials that were left out because they have no reference for any compared angle.
@@ -89,8 +96,11 @@ pub(super) fn summarize(outcomes: &[TrialOutcome], contenders: &[Contender]) -> 
             }
         }
     }
-    evaluation.errors = error_rows(&groups, contenders);
-    for ((dataset, exercise), trials) in groups {
+    let sets = sets(&groups);
+    evaluation.errors = error_rows(&sets, contenders);
+    evaluation.verdict = verdict(&sets, contenders);
+    evaluation.segment_lengths = segment_lengths(&sets, contenders);
+    for ((dataset, exercise), trials) in &groups {
         for (i, contender) in contenders.iter().enumerate() {
             let n_failed = trials.iter().filter(|trial| trial.results[i].is_err()).count();
             let found: Vec<&[Comparison]> =
@@ -98,8 +108,8 @@ pub(super) fn summarize(outcomes: &[TrialOutcome], contenders: &[Contender]) -> 
             for (measure, _) in MEASURES {
                 for sides in [&Side::BOTH[..], &[Side::Left], &[Side::Right]] {
                     let Some(mut row) = row_of(&found, measure, sides) else { continue };
-                    row.dataset = dataset.to_owned();
-                    row.exercise = exercise.to_owned();
+                    row.dataset = (*dataset).to_owned();
+                    row.exercise = (*exercise).to_owned();
                     row.method = contender.name();
                     row.n_failed = n_failed;
                     evaluation.rows.push(row);
@@ -107,25 +117,38 @@ pub(super) fn summarize(outcomes: &[TrialOutcome], contenders: &[Contender]) -> 
             }
         }
     }
+    evaluation.overview = overview(&evaluation.rows, &sets, contenders);
     evaluation
 }
 
 /// Trials by data set and exercise.
 type Groups<'a> = BTreeMap<(&'a str, &'a str), Vec<&'a TrialOutcome>>;
 
-/// The paper's error analysis of every data set: each side, each exercise and all of them, each method.
-fn error_rows(groups: &Groups<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
-    let baseline = contenders.iter().position(|contender| *contender == Contender::Method(Method::Nite));
-    let mut sets: BTreeMap<&str, Vec<(&str, Vec<&TrialOutcome>)>> = BTreeMap::new();
+/// Exercise of the lines that take all exercises of a data set together.
+pub const ALL_EXERCISES: &str = "all";
+
+/// Exercises of each data set with their trials; all of them together come last.
+pub(super) type Sets<'a> = BTreeMap<&'a str, Vec<(&'a str, Vec<&'a TrialOutcome>)>>;
+
+pub(super) fn sets<'a>(groups: &Groups<'a>) -> Sets<'a> {
+    let mut sets = Sets::new();
     for ((dataset, exercise), trials) in groups {
         sets.entry(dataset).or_default().push((exercise, trials.clone()));
     }
-    let mut rows = Vec::new();
-    for (dataset, mut exercises) in sets {
+    for exercises in sets.values_mut() {
         let all = exercises.iter().flat_map(|(_, trials)| trials.iter().copied()).collect();
-        exercises.push(("all", all));
+        exercises.push((ALL_EXERCISES, all));
+    }
+    sets
+}
+
+/// The paper's error analysis of every data set: each side, each exercise and all of them, each method.
+fn error_rows(sets: &Sets<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
+    let baseline = contenders.iter().position(|contender| *contender == Contender::MIDDLEWARE);
+    let mut rows = Vec::new();
+    for (dataset, exercises) in sets {
         for side in Side::BOTH {
-            for (exercise, trials) in &exercises {
+            for (exercise, trials) in exercises {
                 for (i, contender) in contenders.iter().enumerate() {
                     let mut found = Vec::new();
                     for trial in trials {
@@ -140,8 +163,8 @@ fn error_rows(groups: &Groups<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
                     if found.is_empty() {
                         continue;
                     }
-                    let mut row = error_row(contender.name(), side, &found);
-                    row.dataset = dataset.to_owned();
+                    let mut row = error_row(&contender.name(), side, &found);
+                    row.dataset = (*dataset).to_owned();
                     row.exercise = (*exercise).to_owned();
                     rows.push(row);
                 }
@@ -151,19 +174,25 @@ fn error_rows(groups: &Groups<'_>, contenders: &[Contender]) -> Vec<ErrorRow> {
     rows
 }
 
+/// Agreement in one measure of one trial, its sides pooled.
+pub(super) fn agreement_in_trial(trial: &[Comparison], measure: &str, sides: &[Side]) -> Agreement {
+    let own = trial.iter().filter(|c| c.measure == measure && sides.contains(&c.side));
+    own.fold(Agreement::default(), |sum, c| sum.pooled(Agreement::between(&c.estimate, &c.reference)))
+}
+
 /// The line of a measure over trials, its place left empty; none when no trial has the measure.
 fn row_of(trials: &[&[Comparison]], measure: &'static str, sides: &[Side]) -> Option<Row> {
     let mut agreements = Vec::new();
     let (mut referenced, mut observed, mut intervals) = (0, 0, (0, 0));
     for trial in trials {
-        let mut pooled = Agreement::default();
         for comparison in trial.iter().filter(|c| c.measure == measure && sides.contains(&c.side)) {
-            pooled = pooled.pooled(Agreement::between(&comparison.estimate, &comparison.reference));
             referenced += comparison.reference.iter().filter(|v| v.is_finite()).count();
             observed += comparison.observed;
-            intervals.0 += comparison.intervals.0;
-            intervals.1 += comparison.intervals.1;
+            let (with_interval, held) = comparison.held_by_intervals();
+            intervals.0 += with_interval;
+            intervals.1 += held;
         }
+        let pooled = agreement_in_trial(trial, measure, sides);
         if pooled.n() > 0 {
             agreements.push(pooled);
         }
@@ -180,7 +209,7 @@ fn row_of(trials: &[&[Comparison]], measure: &'static str, sides: &[Side]) -> Op
     Some(Row {
         dataset: String::new(),
         exercise: String::new(),
-        method: "",
+        method: String::new(),
         measure: format!("{side}{measure}"),
         n_trials: agreements.len(),
         n_failed: 0,

@@ -1,18 +1,24 @@
 //! `surefoot evaluate`: methods beside a reference.
 
+mod document;
+mod noise;
+mod sources;
 mod table;
+mod verdict_table;
+mod watch;
 
 use crate::assessment::JointAngleSettings;
-use crate::evaluation::joint_angles::evaluate;
-use crate::evaluation::{Contender, Evaluation, Trial, TrialSource};
-use crate::recording::import::{Dataset, ImportError, list};
-use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
-use anyhow::bail;
+use crate::evaluation::contender::{PAPER_PARTICLES, PARTICLES};
+use crate::evaluation::joint_angles::run as run_contenders;
+use crate::evaluation::{Contender, Evaluation, TrialSource, figures};
+use crate::synthetic::Preset;
+use anyhow::{Context, bail};
 use clap::Subcommand;
-use indicatif::{ProgressBar, ProgressStyle};
+use noise::Noise;
 use std::fs;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use watch::Watch;
 
 /// Measure how well estimates agree with a reference.
 #[derive(Debug, clap::Args)]
@@ -30,40 +36,59 @@ enum What {
 /// Compare methods with the reference angles of every importable trial below a directory, or of simulated exercises.
 ///
 /// Prints, for each data set, exercise, method and angle: trials, frames, coverage, and the medians over the trials of
-/// mean absolute error, root mean square error with and without the constant offset, and correlation. `raw` is the
+/// mean absolute error, root mean square error with and without the constant offset, and correlation; then each method
+/// over all exercises with the share of 95 % intervals that hold the reference, and whether the default beats, ties or
+/// loses against each other method.
+///
+/// With --table2 everything runs side by side: every real trial that has a reference, and the five simulated exercises
+/// with every sensor; every method, those with particles at 128, 512 and 2048; and the paper's Table 2 is printed: mean
+/// and quartiles of the errors, the gain over the middleware, and Wilcoxon's signed-rank test.
+///
+/// A method is written as `iekf`, with a pass as `iekf-filter`, with particles as `particle/512`; `raw` is the
 /// three-point angle of the recorded joints.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot evaluate joint-angles --data ../shared/data\n  \
-    surefoot evaluate joint-angles --data uiprmd --methods raw,iekf --json\n  \
-    surefoot evaluate joint-angles --simulated --noise kinect-v2 --seeds 10 --table")]
+    surefoot evaluate joint-angles --table2 --svg figures\n  \
+    surefoot evaluate joint-angles --table2 --json > table2.json\n  \
+    surefoot evaluate joint-angles --table2 --simulated --noise table1,failures --seeds 10\n  \
+    surefoot evaluate joint-angles --simulated --noise kinect-v2 --methods raw,iekf,iekf-filter,particle/2048")]
 struct JointAngleArgs {
-    /// Directory of the data sets, or of one of them (uiprmd, utdmhad, keraal, cmu)
-    #[arg(long, env = "SUREFOOT_DATA", default_value = "../shared/data", value_name = "DIR")]
-    data: PathBuf,
+    /// Directory of the data sets, or of one of them (uiprmd, utdmhad, keraal, cmu); with --table2 this leaves the
+    /// simulated exercises out [default: $SUREFOOT_DATA, else ../shared/data]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
     /// Evaluate the five synthetic exercises with known truth instead of data
     #[arg(long)]
     simulated: bool,
-    /// Sensor errors of simulated exercises: clean, table1, kinect-v2, failures
-    #[arg(long, default_value = "table1", value_name = "PRESET")]
-    noise: Preset,
-    /// Simulated subjects for each exercise
-    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    seeds: u64,
-    /// Methods, comma separated: raw, iekf, particle, ik, nite
-    #[arg(long, value_delimiter = ',', default_value = "raw,ik,particle,iekf,nite", value_name = "LIST")]
+    /// Sensor errors of simulated exercises, comma separated: clean, table1, kinect-v2, failures, or all [default:
+    /// table1; with --table2 all]
+    #[arg(long, value_name = "LIST")]
+    noise: Option<Noise>,
+    /// Simulated subjects for each exercise and sensor [default: 3; with --table2 6, the fewest that a signed-rank test
+    /// over trials can tell apart]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    seeds: Option<u64>,
+    /// Methods, comma separated [default: raw and every method; with --table2 also the filters of those that smooth]
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
     methods: Vec<Contender>,
-    /// Particles of the paper's filter
-    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536))]
-    particles: u32,
+    /// Particles of the methods that have them, comma separated, for those that do not say how many themselves [default:
+    /// 512; with --table2 128,512,2048]
+    #[arg(long, value_delimiter = ',', value_name = "LIST",
+        value_parser = clap::value_parser!(u32).range(i64::from(*PARTICLES.start())..=i64::from(*PARTICLES.end())))]
+    particles: Vec<u32>,
     /// Seed of the methods' random streams
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Print one JSON object
+    /// Print the paper's Table 2: rotation errors of hips and knees, and the gain over the middleware
+    #[arg(long)]
+    table2: bool,
+    /// Print one JSON object with everything
     #[arg(long)]
     json: bool,
-    /// Also print the paper's Table 2: rotation errors of hips and knees, and the gain over the middleware
-    #[arg(long)]
-    table: bool,
+    /// Also write figures as SVG into a directory: time series, errors beside the middleware's, box plots, and the gain
+    /// by the number of particles
+    #[arg(long, value_name = "DIR")]
+    svg: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -76,127 +101,136 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
+/// What is compared with what: the arguments with their defaults.
+#[derive(Debug)]
+struct Plan {
+    /// Directory of real trials.
+    data: Option<PathBuf>,
+    /// Sensors of simulated ones.
+    noise: Vec<Preset>,
+    seeds: u64,
+    contenders: Vec<Contender>,
+    settings: JointAngleSettings,
+}
+
 fn joint_angles(args: &JointAngleArgs, out: &mut dyn Write) -> anyhow::Result<()> {
-    let sources = if args.simulated { simulated(args.noise, args.seeds) } else { imported(&args.data)? };
-    let settings = JointAngleSettings { particles: args.particles, seed: args.seed, ..JointAngleSettings::default() };
-    let bar = progress_bar(sources.len() as u64);
-    let evaluation = evaluate(&sources, &args.methods, &settings, || bar.inc(1));
-    bar.finish_and_clear();
+    let plan = plan(args)?;
+    let sources = sources_of(&plan)?;
+    let watch = Watch::new(sources.len() as u64);
+    let outcomes = run_contenders(&sources, &plan.contenders, &plan.settings, || watch.one_more());
+    watch.finish();
+    let evaluation = outcomes.summarize();
+    report_gaps(&evaluation);
+    if let Some(directory) = &args.svg {
+        write_figures(&figures::draw(&outcomes, &evaluation)?, directory)?;
+    }
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(&document::document(&plan, &evaluation))?)?;
+        return Ok(());
+    }
+    table::agreement(&evaluation, out)?;
+    if args.table2 {
+        table::errors(&evaluation, out)?;
+    }
+    table::overview(&evaluation, out)?;
+    table::segment_lengths(&evaluation, out)?;
+    verdict_table::print(evaluation.verdict.as_ref(), out)?;
+    Ok(())
+}
+
+fn plan(args: &JointAngleArgs) -> anyhow::Result<Plan> {
+    if args.noise.is_some() && !args.simulated && !args.table2 {
+        bail!("--noise is of simulated exercises; add --simulated");
+    }
+    // Table 2 without a choice is all of it.
+    let real = if args.table2 { args.data.is_some() || !args.simulated } else { !args.simulated };
+    let simulated = args.simulated || args.table2 && args.data.is_none();
+    if args.data.is_some() && args.simulated && !args.table2 {
+        bail!("give --data or --simulated; both in one run is --table2 --data DIR --simulated");
+    }
+    let noise = match (&args.noise, args.table2) {
+        (Some(noise), _) => noise.0.clone(),
+        (None, true) => Preset::ALL.to_vec(),
+        (None, false) => vec![Preset::Table1],
+    };
+    let particles = match (&args.particles[..], args.table2) {
+        ([], true) => &PAPER_PARTICLES[..],
+        (given, _) => given,
+    };
+    let mut settings = JointAngleSettings { seed: args.seed, ..JointAngleSettings::default() };
+    // One number is a setting of the run; several are contenders of their own.
+    let counts = match particles {
+        [one] if !args.table2 => {
+            settings.particles = *one;
+            &[]
+        }
+        several => several,
+    };
+    let mut contenders = Vec::new();
+    let named = match (&args.methods[..], args.table2) {
+        ([], true) => Contender::table2(counts),
+        ([], false) => Contender::all(),
+        (named, _) => named.to_vec(),
+    };
+    for contender in named.into_iter().flat_map(|contender| contender.with_each(counts)) {
+        if !contenders.contains(&contender) {
+            contenders.push(contender);
+        }
+    }
+    Ok(Plan {
+        data: if real { data_directory(args)? } else { None },
+        noise: if simulated { noise } else { Vec::new() },
+        seeds: args.seeds.unwrap_or(if args.table2 { 6 } else { 3 }),
+        contenders,
+        settings,
+    })
+}
+
+/// Directory of the data; none when nobody asked for it, it is not there, and simulated exercises run anyway.
+fn data_directory(args: &JointAngleArgs) -> anyhow::Result<Option<PathBuf>> {
+    let usual = || std::env::var_os("SUREFOOT_DATA").map_or(PathBuf::from("../shared/data"), PathBuf::from);
+    let directory = args.data.clone().unwrap_or_else(usual);
+    if directory.is_dir() {
+        return Ok(Some(directory));
+    }
+    let told = format!("there is no directory {}", directory.display());
+    if args.table2 && args.data.is_none() {
+        eprintln!("no real recordings: {told}; give the data sets' directory with SUREFOOT_DATA");
+        return Ok(None);
+    }
+    bail!("{told}; give the data sets' directory with --data or SUREFOOT_DATA, or use --simulated")
+}
+
+fn sources_of(plan: &Plan) -> anyhow::Result<Vec<TrialSource>> {
+    let mut found = match &plan.data {
+        Some(directory) => sources::imported(directory)?,
+        None => Vec::new(),
+    };
+    for noise in &plan.noise {
+        found.extend(sources::simulated(*noise, plan.seeds));
+    }
+    Ok(found)
+}
+
+/// Says on standard error what is not in the tables.
+fn report_gaps(evaluation: &Evaluation) {
     for failure in &evaluation.failures {
-        eprintln!("failed: {} ({}): {}", failure.trial, failure.method.unwrap_or("loading"), failure.reason);
+        let method = failure.method.as_deref().unwrap_or("loading");
+        eprintln!("failed: {} ({method}): {}", failure.trial, failure.reason);
     }
     if evaluation.n_without_reference > 0 {
         eprintln!("left out: {} trials without reference angles of hips or knees", evaluation.n_without_reference);
     }
-    if args.json {
-        writeln!(out, "{}", serde_json::to_string_pretty(&document(args, &evaluation))?)?;
-        return Ok(());
+}
+
+fn write_figures(figures: &[figures::Figure], directory: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(directory).with_context(|| format!("cannot make {}", directory.display()))?;
+    for figure in figures {
+        let file = directory.join(format!("{}.svg", figure.name));
+        fs::write(&file, &figure.svg).with_context(|| format!("cannot write {}", file.display()))?;
     }
-    table::agreement(&evaluation, out)?;
-    if args.table {
-        table::errors(&evaluation, out)?;
-    }
+    eprintln!("{} figures in {}", figures.len(), directory.display());
     Ok(())
-}
-
-/// The result as JSON, with what is needed to get it again.
-fn document(args: &JointAngleArgs, evaluation: &Evaluation) -> serde_json::Value {
-    let data = if args.simulated {
-        format!("simulated, noise {}, {} seeds", args.noise, args.seeds)
-    } else {
-        args.data.display().to_string()
-    };
-    let mut document = serde_json::json!({
-        "rows": evaluation.rows,
-        "failures": evaluation.failures,
-        "n_without_reference": evaluation.n_without_reference,
-        "data": data,
-        "particles": args.particles,
-        "seed": args.seed,
-        "machine": machine(),
-        "version": env!("CARGO_PKG_VERSION"),
-    });
-    if args.table {
-        document["errors"] = serde_json::json!(evaluation.errors);
-    }
-    document
-}
-
-/// Name and number of the processors, as far as the system tells.
-fn machine() -> serde_json::Value {
-    let information = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = information.lines().find(|line| line.starts_with("model name"));
-    let cpu = model.and_then(|line| line.split_once(':')).map_or("unknown", |(_, name)| name.trim());
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    serde_json::json!({ "cpu": cpu, "cores": cores })
-}
-
-/// Every trial of every data set at or below a directory.
-fn imported(directory: &Path) -> anyhow::Result<Vec<TrialSource>> {
-    if !directory.is_dir() {
-        bail!(
-            "there is no directory {}; give the data sets' directory with --data or SUREFOOT_DATA, or use --simulated",
-            directory.display()
-        );
-    }
-    let mut sources = Vec::new();
-    for dataset in Dataset::ALL {
-        let found = match list(dataset, directory) {
-            Ok(found) => found,
-            Err(ImportError::NotFound { .. }) => continue,
-            Err(error) => return Err(error.into()),
-        };
-        for source in found {
-            // Exercises done wrongly on purpose are kept apart from the same done well.
-            let manner = if source.name.ends_with("_inc") { "_incorrect" } else { "" };
-            let exercise = format!("{}{manner}", source.exercise);
-            sources.push(TrialSource::new(format!("{} {}", dataset.name(), source.name), move || {
-                let trial = source.read().map_err(|error| error.to_string())?;
-                Ok(Trial { dataset: dataset.name().to_owned(), exercise: exercise.clone(), recording: trial.recording })
-            }));
-        }
-    }
-    if sources.is_empty() {
-        let names = Dataset::ALL.map(Dataset::name).join(", ");
-        bail!(
-            "no trials of {names} below {}; give their directory with --data, or use --simulated",
-            directory.display()
-        );
-    }
-    Ok(sources)
-}
-
-/// The synthetic exercises, each by several subjects of different height and direction.
-fn simulated(noise: Preset, seeds: u64) -> Vec<TrialSource> {
-    let mut sources = Vec::new();
-    for exercise in Exercise::ALL {
-        for seed in 1..=seeds {
-            sources.push(TrialSource::new(format!("{exercise}, seed {seed}"), move || {
-                let settings = SimulationSettings {
-                    jitter: true,
-                    // Steps that never repeat within a few subjects: heights 1.55 to 1.85 m, up to 10° to either side.
-                    stature_m: 1.55 + 0.3 * (0.618 * seed as f64).fract(),
-                    yaw_deg: -10.0 + 20.0 * (0.414 * seed as f64).fract(),
-                    ..SimulationSettings::new(exercise, noise, seed)
-                };
-                let recording = simulate(&settings).map_err(|error| error.to_string())?.recording;
-                Ok(Trial { dataset: format!("simulated-{noise}"), exercise: exercise.name().to_owned(), recording })
-            }));
-        }
-    }
-    sources
-}
-
-/// A bar on standard error, or nothing when nobody watches.
-fn progress_bar(trials: u64) -> ProgressBar {
-    if !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::new(trials);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} trials, {eta} left") {
-        bar.set_style(style);
-    }
-    bar
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 use super::*;
+use crate::synthetic::Exercise;
 use clap::Parser;
+use std::collections::HashSet;
 
 #[derive(Parser)]
 struct Command {
@@ -43,11 +45,107 @@ fn json_has_one_row_for_each_exercise_method_and_measure() {
 
 #[test]
 fn tables_name_every_exercise_and_the_paper_s_columns() {
-    let output = output_of(&["--simulated", "--seeds", "1", "--methods", "raw,ik,nite", "--table"]).unwrap();
+    let words = ["--table2", "--simulated", "--noise", "table1", "--seeds", "1", "--methods", "raw,iekf,ik,nite"];
+    let output = output_of(&words).unwrap();
     for exercise in Exercise::ALL {
         assert!(output.contains(&format!("simulated-table1 {exercise}")), "{output}");
     }
-    assert!(output.contains("hip gain over nite") && output.contains("right side"), "{output}");
+    for said in [
+        "hip gain over nite",
+        "Table 2: simulated-table1, right side",
+        "simulated-table1, all exercises, both sides",
+        "output of iekf 0.000000000",
+        "Verdict: does iekf beat",
+    ] {
+        assert!(output.contains(said), "{said}: {output}");
+    }
+}
+
+#[test]
+fn table_2_runs_every_contender_on_every_sensor_and_says_the_same_twice() {
+    let words =
+        ["--table2", "--simulated", "--noise", "failures,clean", "--seeds", "1", "--particles", "16,32", "--json"];
+    let output = output_of(&words).unwrap();
+    let document: serde_json::Value = serde_json::from_str(&output).unwrap();
+    let texts = |list: &str, field: &str| {
+        let rows = document[list].as_array().unwrap().iter();
+        rows.map(|row| row[field].as_str().unwrap().to_owned()).collect::<HashSet<_>>()
+    };
+    let contenders = Contender::table2(&[16, 32]);
+    let all: HashSet<String> = contenders.iter().map(|contender| contender.name()).collect();
+    assert_eq!(texts("rows", "method"), all);
+    assert_eq!(texts("rows", "dataset"), ["simulated-clean", "simulated-failures"].map(String::from).into());
+    let methods: HashSet<String> = all.iter().filter(|name| *name != "raw").cloned().collect();
+    assert_eq!(texts("errors", "method"), methods);
+    let others: HashSet<String> = all.iter().filter(|name| *name != "iekf").cloned().collect();
+    assert_eq!(document["verdict"]["default"], "iekf");
+    let against = document["verdict"]["scores"].as_array().unwrap().iter();
+    assert_eq!(against.map(|score| score["against"].as_str().unwrap().to_owned()).collect::<HashSet<_>>(), others);
+    assert_eq!(document["settings"]["contenders"].as_array().unwrap().len(), contenders.len());
+    assert_eq!(document["segment_lengths"].as_array().unwrap().len(), 2);
+    assert_eq!(output, output_of(&words).unwrap());
+}
+
+fn plan_of(words: &[&str]) -> anyhow::Result<Plan> {
+    let args = Command::try_parse_from(["evaluate", "joint-angles"].iter().chain(words))?.args;
+    let What::JointAngles(args) = args.what;
+    plan(&args)
+}
+
+#[test]
+fn table_2_takes_everything_unless_a_part_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path().to_str().unwrap();
+    let real = plan_of(&["--table2", "--data", directory]).unwrap();
+    assert!(real.data.is_some() && real.noise.is_empty());
+    let simulated = plan_of(&["--table2", "--simulated"]).unwrap();
+    assert_eq!((simulated.data, &simulated.noise[..], simulated.seeds), (None, &Preset::ALL[..], 6));
+    let both = plan_of(&["--table2", "--data", directory, "--simulated", "--noise", "clean"]).unwrap();
+    assert!(both.data.is_some() && both.noise == [Preset::Clean]);
+    let whole = plan_of(&["--table2"]).unwrap();
+    assert_eq!(whole.noise, Preset::ALL);
+    assert_eq!(whole.contenders, Contender::table2(&[128, 512, 2048]));
+}
+
+#[test]
+fn particles_are_a_setting_when_there_is_one_number_and_contenders_when_there_are_several() {
+    let names = |words: &[&str]| {
+        let plan = plan_of(&[&["--simulated"], words].concat()).unwrap();
+        (plan.contenders.iter().map(|c| c.name()).collect::<Vec<_>>(), plan.settings.particles)
+    };
+    let (usual, particles) = names(&[]);
+    assert_eq!((usual.len(), particles), (Contender::all().len(), 512));
+    assert!(usual.contains(&"particle".to_owned()));
+    assert_eq!(names(&["--methods", "particle,ik", "--particles", "64"]), (vec!["particle".into(), "ik".into()], 64));
+    let several = names(&["--methods", "particle,particle/32,ik", "--particles", "32,64"]).0;
+    assert_eq!(several, ["particle/32", "particle/64", "ik"]);
+    let named = names(&["--methods", "raw,iekf-filter,particle/2048"]).0;
+    assert_eq!(named, ["raw", "iekf-filter", "particle/2048"]);
+}
+
+#[test]
+fn arguments_that_would_be_ignored_are_refused() {
+    for (words, said) in [
+        (&["--noise", "clean"][..], "add --simulated"),
+        (&["--simulated", "--data", "."], "--table2"),
+        (&["--simulated", "--methods", "ik/64"], "no particles"),
+        (&["--simulated", "--particles", "8"], "16"),
+    ] {
+        let refusal = plan_of(words).unwrap_err().to_string();
+        assert!(refusal.contains(said), "{words:?}: {refusal}");
+    }
+}
+
+#[test]
+fn figures_are_written_as_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let figures = folder.path().join("figures");
+    let words = ["--simulated", "--seeds", "1", "--methods", "raw,iekf,nite", "--svg", figures.to_str().unwrap()];
+    output_of(&words).unwrap();
+    for name in ["series-simulated-table1-step", "scatter-simulated-table1", "boxes-simulated-table1"] {
+        let svg = fs::read_to_string(figures.join(format!("{name}.svg"))).unwrap();
+        assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>"), "{name}");
+    }
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn raw_joints_without_noise_agree_with_the_truth_exactly() {
 #[test]
 fn there_is_a_line_for_both_sides_together_and_for_each() {
     let sources = [trial(Exercise::SideHip, Preset::Table1, 1)];
-    let contenders = [Contender::Raw, Contender::Method(Method::Ik)];
+    let contenders = [Contender::Raw, Contender::of(Method::Ik)];
     let evaluation = evaluate(&sources, &contenders, &settings(), || ());
     let measures = |method: &str| {
         let rows = evaluation.rows.iter().filter(|r| r.method == method);
@@ -60,8 +60,8 @@ fn a_trial_that_cannot_be_loaded_or_assessed_is_reported_and_the_others_count() 
         Ok(Trial { dataset: "simulated".into(), exercise: "step".into(), recording })
     });
     let sources = [broken, one_frame, trial(Exercise::Step, Preset::Clean, 2)];
-    let evaluation = evaluate(&sources, &[Contender::Method(Method::Ik)], &settings(), || ());
-    let told: Vec<_> = evaluation.failures.iter().map(|f| (f.trial.as_str(), f.method)).collect();
+    let evaluation = evaluate(&sources, &[Contender::of(Method::Ik)], &settings(), || ());
+    let told: Vec<_> = evaluation.failures.iter().map(|f| (f.trial.as_str(), f.method.as_deref())).collect();
     assert_eq!(told, [("broken", None), ("one frame", Some("ik"))]);
     assert_eq!(evaluation.failures[0].reason, "the file is empty");
     let knee = row(&evaluation, Exercise::Step, "ik", "knee_flexion");
@@ -82,7 +82,7 @@ fn the_result_is_the_same_with_one_and_with_several_threads() {
 #[test]
 fn the_default_s_intervals_are_counted_against_the_truth() {
     let sources = [trial(Exercise::BackKnee, Preset::Table1, 1)];
-    let evaluation = evaluate(&sources, &[Contender::Method(Method::Iekf)], &settings(), || ());
+    let evaluation = evaluate(&sources, &[Contender::of(Method::Iekf)], &settings(), || ());
     let knee = row(&evaluation, Exercise::BackKnee, "iekf", "knee_flexion");
     let inside = knee.interval_coverage.expect("the default has intervals");
     assert!(inside > 0.5 && inside <= 1.0, "{inside}");
@@ -104,4 +104,47 @@ fn full_turns_are_no_error() {
         // The series are f32: at 400° they resolve 3e-5°.
         assert!((rmse(a) - rmse(b)).abs() < 1e-3, "{} {:?}", a.measure, a.side);
     }
+}
+
+#[test]
+fn a_method_has_particles_exactly_when_its_assessment_tells_an_effective_sample_size() {
+    let recording = (trial(Exercise::BackKnee, Preset::Table1, 1).load)().unwrap().recording;
+    for method in Method::ALL {
+        let own = JointAngleSettings { method, ..settings() };
+        let assessment = pipeline::assess(&recording, &Settings::JointAngles(own), &Monitor::default()).unwrap();
+        assert_eq!(method.has_particles(), assessment.quality.effective_sample_size.is_some(), "{method}");
+    }
+}
+
+#[test]
+fn the_overview_takes_the_exercises_of_a_data_set_together() {
+    let sources = [trial(Exercise::Step, Preset::Table1, 1), trial(Exercise::SideHip, Preset::Table1, 1)];
+    let contenders = [Contender::default_method(), Contender::of(Method::Ik)];
+    let evaluation = evaluate(&sources, &contenders, &settings(), || ());
+    assert_eq!(evaluation.overview.len(), contenders.len() * MEASURES.len());
+    let knee = |method: &str| {
+        let mut rows = evaluation.overview.iter();
+        rows.find(|row| row.method == method && row.measure == "knee_flexion").unwrap()
+    };
+    let of = |exercise| row(&evaluation, exercise, "iekf", "knee_flexion");
+    let (step, side_hip) = (of(Exercise::Step), of(Exercise::SideHip));
+    let mean = (step.mae_deg.unwrap() + side_hip.mae_deg.unwrap()) / 2.0;
+    assert!(knee("iekf").n_exercises == 2 && (knee("iekf").mae_deg.unwrap() - mean).abs() < 1e-12);
+    let held = |row: &Row| row.interval_coverage.unwrap() * row.n_frames as f64;
+    let share = (held(step) + held(side_hip)) / (step.n_frames + side_hip.n_frames) as f64;
+    assert!((knee("iekf").interval_coverage.unwrap() - share).abs() < 1e-12);
+    assert_eq!((knee("ik").interval_coverage, knee("ik").interval_coverage_as_promised), (None, None));
+}
+
+#[test]
+fn the_verdict_compares_the_default_with_every_other_in_each_exercise_and_in_all() {
+    let sources = [trial(Exercise::Step, Preset::Table1, 1), trial(Exercise::SideHip, Preset::Table1, 1)];
+    let contenders = [Contender::Raw, Contender::default_method(), Contender::of(Method::Ik)];
+    let verdict = evaluate(&sources, &contenders, &settings(), || ()).verdict.unwrap();
+    // Two exercises and all; raw in the knee only, `ik` in four angles; two statistics.
+    assert_eq!(verdict.rows.len(), 3 * (1 + 4) * 2);
+    let scored: usize = verdict.scores.iter().map(|score| score.beats + score.ties + score.loses).sum();
+    assert_eq!(scored, 2 * (1 + 4) * 2, "rows of all exercises are not counted again");
+    assert_eq!(verdict.default_beats_or_ties_everywhere, verdict.losses().count() == 0);
+    assert_eq!(evaluate(&sources, &contenders[..1], &settings(), || ()).verdict, None);
 }
