@@ -14,7 +14,7 @@ pub struct Quality {
     pub median_interval_s: f64,
     /// Longest time between two frames, seconds.
     pub longest_gap_s: f64,
-    /// Share of frames in which every joint of the model was seen, 0 to 1.
+    /// Share of frames in which every joint of the model was seen and believed, 0 to 1.
     pub coverage: f64,
     /// Effective number of particles, when the method has particles.
     pub effective_sample_size: Option<EffectiveSampleSize>,
@@ -22,8 +22,11 @@ pub struct Quality {
     pub calibration: Option<CalibrationQuality>,
     /// What the reader should know; each has a stable code.
     pub warnings: Vec<Warning>,
-    /// What happened when.
+    /// What went wrong when, by time; the longest thousand when there were more.
     pub events: Vec<Event>,
+    /// How often each kind of event happened; a kind that was looked for and not found has zeros.
+    #[serde(default)]
+    pub event_counts: Vec<EventCount>,
 }
 
 /// Effective sample size of a particle filter, in particles.
@@ -77,15 +80,30 @@ impl Warning {
     }
 }
 
-/// Something that happened during a recording.
+/// Something that went wrong during a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Event {
-    /// Kind, for example `joint_lost`.
+    /// Kind: `frame_gap`, `lost_user`, `lost_joint`, `limb_swap`, `hand_jump`, `foot_jump` or `occlusion`.
     pub kind: String,
-    /// What it concerns, for example `left_knee`.
+    /// What it concerns: a joint of the recording, for example `left_wrist`; `legs` or `arms` that were exchanged;
+    /// `user`, or `recording`.
     pub subject: String,
-    /// First second.
+    /// Time of the first frame concerned, seconds from the recording's first frame. A gap begins at the frame before it.
     pub start_s: f64,
-    /// Last second.
+    /// Time of the last frame concerned, seconds from the recording's first frame. A gap ends at the frame after it.
     pub end_s: f64,
+    /// Frames concerned; of a gap the frames that are missing by the median interval.
+    #[serde(default)]
+    pub n_frames: u64,
+}
+
+/// How often a kind of event happened in a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EventCount {
+    /// Kind, as in the events.
+    pub kind: String,
+    /// Events.
+    pub n_events: u64,
+    /// Frames concerned, summed over the events; a frame counts once for each subject.
+    pub n_frames: u64,
 }

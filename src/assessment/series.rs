@@ -29,8 +29,12 @@ pub const FLAG_OUTLIER: u8 = 8;
 /// The rotation was turned by 180° about the limb's axis to undo a flip of the middleware.
 pub const FLAG_FLIP_CORRECTED: u8 = 16;
 
+/// The sensor had taken the left limb for the right one; they were exchanged back before the estimate.
+pub const FLAG_SWAP_CORRECTED: u8 = 32;
+
 /// Names of the flag bits, lowest bit first.
-pub const FLAG_NAMES: [&str; 5] = ["bridged", "not_observable", "singular", "outlier", "flip_corrected"];
+pub const FLAG_NAMES: [&str; 6] =
+    ["bridged", "not_observable", "singular", "outlier", "flip_corrected", "swap_corrected"];
 
 /// One line about one series. Numbers are in the unit that ends the channel's name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

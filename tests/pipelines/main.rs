@@ -1,5 +1,6 @@
 //! Whole pipelines on recordings with known truth.
 
+mod events;
 mod support;
 
 use support::{centimetres, exercise, mean_absolute_error, mirrored, series, without};

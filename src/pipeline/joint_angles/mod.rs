@@ -1,9 +1,11 @@
 //! Joint angles from skeleton joint positions (\[angles\]).
 //!
-//! Twelve points relative to the torso joint → calibration (lengths, offsets, facing) → the chosen method's posterior
+//! Twelve points relative to the torso joint → events (exchanged limbs exchanged back, jumps taken out) → calibration
+//! (lengths, offsets, facing) → the chosen method's posterior
 //! of the posture in every frame → anatomical angles with intervals and flags.
 
 pub mod calibration;
+pub mod events;
 pub mod iekf;
 pub mod inverse_kinematics;
 pub mod middleware;
@@ -21,6 +23,7 @@ use crate::body::Pose;
 use crate::progress::{Monitor, Step};
 use crate::recording::Recording;
 use calibration::{Calibration, calibrate};
+use events::{Inspection, Repairs, inspect};
 use noise_model::NoiseModel;
 use observation::{ALL_SEEN, Observations};
 use posterior::{Posterior, SeriesBuilder};
@@ -48,10 +51,15 @@ pub fn assess(
     let pass =
         settings.chosen_pass().map_err(|error| PipelineError::unsuitable("no_backward_pass", error.to_string()))?;
     monitor.begin(Step::Calibrating, 0)?;
-    let mut observations = Observations::from_recording(skeleton, settings)?;
+    let recorded = Observations::from_recording(skeleton, settings)?;
+    let Inspection { repaired, repairs, events, counts } = inspect(skeleton, &recorded, settings)?;
+    // The middleware's rotations cannot be repaired: `nite` shows them as they are.
+    let (mut observations, repairs) =
+        if settings.method == Method::Nite { (recorded, Repairs::default()) } else { (repaired, repairs) };
     let calibration = calibrate(&mut observations)?;
     let mut quality = observations_quality(&observations, &calibration);
-    let mut builder = SeriesBuilder::new(observations.len());
+    (quality.events, quality.event_counts) = (events, counts);
+    let mut builder = SeriesBuilder::new(observations.len(), repairs);
     let emit = |posterior: &Posterior| builder.push(&posterior.summarize());
     match settings.method {
         Method::Particle => {
@@ -125,5 +133,6 @@ fn observations_quality(observations: &Observations, calibration: &Calibration) 
         calibration: Some(calibration.quality.clone()),
         warnings: calibration.warnings.clone(),
         events: Vec::new(),
+        event_counts: Vec::new(),
     }
 }

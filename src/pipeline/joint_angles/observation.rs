@@ -42,8 +42,8 @@ impl Observations {
         for t in 0..skeleton.len() {
             let (frame, confidence) = (skeleton.frame(t), skeleton.frame_confidence(t));
             let seen = |column: usize| {
-                let trusted = confidence[column] >= settings.min_confidence && confidence[column] > 0.0;
-                if trusted { frame[column] } else { Vector3::repeat(f64::NAN) }
+                let is_seen = is_trusted(confidence[column], settings.min_confidence);
+                if is_seen { frame[column] } else { Vector3::repeat(f64::NAN) }
             };
             let torso = torso_columns.iter().map(|c| seen(*c)).sum::<Vector3<f64>>() / torso_columns.len() as f64;
             points.push(columns.map(|column| seen(column) - torso));
@@ -106,8 +106,16 @@ pub fn sees_trunk(mask: SeenMask) -> bool {
     Limb::ALL.iter().filter(|limb| mask >> point_index(**limb, 0) & 1 == 1).count() >= 3
 }
 
+/// True when a confidence reaches the least that is believed; a lost joint (0) never is.
+pub fn is_trusted(confidence: f32, min_confidence: f32) -> bool {
+    confidence >= min_confidence && confidence > 0.0
+}
+
 /// Columns of the twelve points in a recording.
-fn point_columns(skeleton: &SkeletonRecording) -> Result<[usize; POINT_COUNT], PipelineError> {
+///
+/// # Errors
+/// `joints_missing` when the recording lacks a joint that the model needs.
+pub fn point_columns(skeleton: &SkeletonRecording) -> Result<[usize; POINT_COUNT], PipelineError> {
     let mut columns = [0; POINT_COUNT];
     let mut missing = Vec::new();
     for limb in Limb::ALL {

@@ -1,7 +1,8 @@
 //! What an estimator knows of one frame, and how a sequence of it becomes series.
 
+use super::events::Repairs;
 use super::observation::{SeenMask, sees_trunk};
-use crate::assessment::series::{FLAG_BRIDGED, FLAG_NOT_OBSERVABLE, FLAG_SINGULAR};
+use crate::assessment::series::{FLAG_BRIDGED, FLAG_NOT_OBSERVABLE, FLAG_OUTLIER, FLAG_SINGULAR, FLAG_SWAP_CORRECTED};
 use crate::assessment::{AngleChannel, Series};
 use crate::body::anatomical_angles::{
     ANGLE_COUNT, Angles, angle_jacobian, angles_of_pose, arm_offset, leg_offset, unobservable_angles,
@@ -69,14 +70,16 @@ pub struct Spread {
 #[derive(Debug)]
 pub struct SeriesBuilder {
     series: Vec<Series>,
+    repairs: Repairs,
     previous: PoseVector,
     previous_angles: Angles,
     is_first: bool,
 }
 
 impl SeriesBuilder {
-    /// A builder with room for a number of frames.
-    pub fn new(frames: usize) -> Self {
+    /// A builder with room for a number of frames, and what was done to their observations before the estimate; empty
+    /// repairs mean none.
+    pub fn new(frames: usize, repairs: Repairs) -> Self {
         let empty = |channel: AngleChannel| {
             let mut series = Series::empty(channel.name(), 0);
             for column in [&mut series.value, &mut series.low, &mut series.high] {
@@ -87,6 +90,7 @@ impl SeriesBuilder {
         };
         Self {
             series: AngleChannel::all().into_iter().map(empty).collect(),
+            repairs,
             previous: PoseVector::zeros(),
             previous_angles: Angles::zeros(),
             is_first: true,
@@ -101,8 +105,16 @@ impl SeriesBuilder {
         }
         let unobservable = unobservable_angles(&frame.pose);
         let hinges = hinge_bounds();
+        let index = self.series[0].value.len();
+        let mask = |of: &[SeenMask]| of.get(index).copied().unwrap_or(0);
+        let (rejected, exchanged) = (mask(&self.repairs.rejected), mask(&self.repairs.exchanged));
+        let repair_flags = |angle: usize| {
+            let needed = needed_points(angle);
+            let outlier = if rejected & needed == 0 { 0 } else { FLAG_OUTLIER };
+            outlier | if exchanged & needed == 0 { 0 } else { FLAG_SWAP_CORRECTED }
+        };
         for angle in 0..ANGLE_COUNT {
-            let mut flags = dependency_flags(angle, frame);
+            let mut flags = dependency_flags(angle, frame) | repair_flags(angle);
             flags |= if singular[angle] { FLAG_SINGULAR } else { 0 };
             flags |= if unobservable[angle] { FLAG_NOT_OBSERVABLE } else { 0 };
             let mut bounds = interval(angles[angle], frame.spread.as_ref().map(|spread| spread.angles[angle]));
@@ -115,7 +127,8 @@ impl SeriesBuilder {
         for joint in 0..5 {
             let attitude = theta.fixed_rows::<3>(3 * joint).into_owned();
             let sd = frame.spread.as_ref().map(|spread| attitude_sd(&attitude, &spread.attitudes[joint]));
-            let flags = dependency_flags(first_angle_of_joint(joint), frame);
+            let first = first_angle_of_joint(joint);
+            let flags = dependency_flags(first, frame) | repair_flags(first);
             for axis in 0..3 {
                 let bounds = interval(attitude[axis], sd.map(|sd| sd[axis]));
                 self.append(ANGLE_COUNT + 3 * joint + axis, attitude[axis], bounds, flags);
@@ -212,11 +225,20 @@ fn dependency_flags(angle: usize, posterior: &Summary) -> u8 {
     let Some(limb) = Limb::ALL.into_iter().find(|limb| limb_angles(*limb).contains(&angle)) else {
         return bridged(trunk_seen);
     };
-    let within = angle - limb_angles(limb).start;
-    // The hinge needs no trunk; the swing shows at the middle joint, twist and hinge only at the end.
-    let needed = if within < 2 { 0b011 } else { 0b111 };
-    let limb_seen = posterior.seen >> point_index(limb, 0) & needed == needed;
-    bridged(limb_seen && (trunk_seen || within == 3)) | posterior.limb_flags[limb.index()]
+    let is_hinge = angle - limb_angles(limb).start == 3;
+    let needed = needed_points(angle);
+    // The hinge needs no trunk.
+    bridged(posterior.seen & needed == needed && (trunk_seen || is_hinge)) | posterior.limb_flags[limb.index()]
+}
+
+/// Points that an angle of a limb shows at, or the limbs' roots for one of the trunk: the swing shows at the middle
+/// joint, twist and hinge only at the end.
+fn needed_points(angle: usize) -> SeenMask {
+    match Limb::ALL.into_iter().find(|limb| limb_angles(*limb).contains(&angle)) {
+        None => Limb::ALL.iter().fold(0, |mask, limb| mask | 1 << point_index(*limb, 0)),
+        Some(limb) if angle - limb_angles(limb).start < 2 => 0b011 << point_index(limb, 0),
+        Some(limb) => 0b111 << point_index(limb, 0),
+    }
 }
 
 /// Anatomical angles of a limb.
@@ -245,7 +267,7 @@ mod tests {
     }
 
     fn series_of(posteriors: &[Posterior], channel: &str) -> Series {
-        let mut builder = SeriesBuilder::new(posteriors.len());
+        let mut builder = SeriesBuilder::new(posteriors.len(), Repairs::default());
         for posterior in posteriors {
             builder.push(&posterior.summarize());
         }

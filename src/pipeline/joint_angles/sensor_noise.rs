@@ -26,7 +26,7 @@ impl SensorNoise {
 }
 
 /// Standard deviation of each point's white noise in the axes of the observations, metres.
-fn white_noise(observations: &Observations) -> [Vector3<f64>; POINT_COUNT] {
+pub fn white_noise(observations: &Observations) -> [Vector3<f64>; POINT_COUNT] {
     let mut noise = [Vector3::zeros(); POINT_COUNT];
     let mut differences = Vec::with_capacity(observations.len());
     for (p, sd) in noise.iter_mut().enumerate() {
