@@ -8,6 +8,7 @@ pub mod calibration;
 pub mod events;
 pub mod iekf;
 pub mod inverse_kinematics;
+pub mod live;
 pub mod middleware;
 pub mod noise_model;
 pub mod observation;
@@ -15,6 +16,7 @@ pub mod particle;
 pub mod particle_model;
 pub mod posterior;
 pub mod sensor_noise;
+pub mod series_builder;
 pub mod state_space;
 
 use super::PipelineError;
@@ -26,8 +28,9 @@ use calibration::{Calibration, calibrate};
 use events::{Inspection, Repairs, inspect};
 use noise_model::NoiseModel;
 use observation::{ALL_SEEN, Observations};
-use posterior::{Posterior, SeriesBuilder};
+use posterior::Posterior;
 use sensor_noise::SensorNoise;
+use series_builder::SeriesBuilder;
 use state_space::{StateSpace, Tuning};
 
 /// Fewest frames of a recording that can be assessed.

@@ -1,6 +1,7 @@
 //! From skeleton frames to the observations of the model: twelve points relative to the torso joint.
 
 use crate::assessment::JointAngleSettings;
+use crate::body::kinematics::Points;
 use crate::body::skeleton::point_index;
 use crate::body::{Joint, Limb, POINT_COUNT};
 use crate::pipeline::PipelineError;
@@ -33,21 +34,9 @@ impl Observations {
     /// # Errors
     /// `joints_missing` when the recording lacks a joint that the model needs.
     pub fn from_recording(skeleton: &SkeletonRecording, settings: &JointAngleSettings) -> Result<Self, PipelineError> {
-        let columns = point_columns(skeleton)?;
-        let torso_columns = match skeleton.column(Joint::Torso) {
-            Some(column) => vec![column],
-            None => Limb::ALL.iter().map(|limb| columns[point_index(*limb, 0)]).collect(),
-        };
-        let mut points = Vec::with_capacity(skeleton.len());
-        for t in 0..skeleton.len() {
-            let (frame, confidence) = (skeleton.frame(t), skeleton.frame_confidence(t));
-            let seen = |column: usize| {
-                let is_seen = is_trusted(confidence[column], settings.min_confidence);
-                if is_seen { frame[column] } else { Vector3::repeat(f64::NAN) }
-            };
-            let torso = torso_columns.iter().map(|c| seen(*c)).sum::<Vector3<f64>>() / torso_columns.len() as f64;
-            points.push(columns.map(|column| seen(column) - torso));
-        }
+        let columns = PointColumns::of(&skeleton.joints)?;
+        let read = |t| columns.points(skeleton.frame(t), skeleton.frame_confidence(t), settings.min_confidence);
+        let points = (0..skeleton.len()).map(read).collect();
         Ok(Self { time_ns: skeleton.time_ns.clone(), points, subject_from_world: Rotation3::identity() })
     }
 
@@ -111,28 +100,55 @@ pub fn is_trusted(confidence: f32, min_confidence: f32) -> bool {
     confidence >= min_confidence && confidence > 0.0
 }
 
-/// Columns of the twelve points in a recording.
-///
-/// # Errors
-/// `joints_missing` when the recording lacks a joint that the model needs.
-pub fn point_columns(skeleton: &SkeletonRecording) -> Result<[usize; POINT_COUNT], PipelineError> {
-    let mut columns = [0; POINT_COUNT];
-    let mut missing = Vec::new();
-    for limb in Limb::ALL {
-        for (level, (joint, stand_in)) in limb.joints().into_iter().enumerate() {
-            match skeleton.column(joint).or_else(|| skeleton.column(stand_in)) {
-                Some(column) => columns[point_index(limb, level)] = column,
-                None => missing.push(joint.name()),
+/// Where the twelve points stand among a sensor's joints.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PointColumns {
+    /// Column of each point.
+    pub points: [usize; POINT_COUNT],
+    /// Columns whose mean is the torso joint: its own, or without one those of shoulders and hips.
+    torso: Vec<usize>,
+}
+
+impl PointColumns {
+    /// The columns of a sensor that reports these joints.
+    ///
+    /// # Errors
+    /// `joints_missing` when the sensor lacks a joint that the model needs.
+    pub fn of(joints: &[Joint]) -> Result<Self, PipelineError> {
+        let column = |joint: Joint| joints.iter().position(|j| *j == joint);
+        let mut points = [0; POINT_COUNT];
+        let mut missing = Vec::new();
+        for limb in Limb::ALL {
+            for (level, (joint, stand_in)) in limb.joints().into_iter().enumerate() {
+                match column(joint).or_else(|| column(stand_in)) {
+                    Some(column) => points[point_index(limb, level)] = column,
+                    None => missing.push(joint.name()),
+                }
             }
         }
+        if !missing.is_empty() {
+            let sentence = format!(
+                "joint angles need the joints {}, which this recording does not have; record them, or name them as in \
+                 the recording format",
+                missing.join(", ")
+            );
+            return Err(PipelineError::Unsuitable { code: "joints_missing", place: Some("joints".into()), sentence });
+        }
+        let torso = match column(Joint::Torso) {
+            Some(column) => vec![column],
+            None => Limb::ALL.iter().map(|limb| points[point_index(*limb, 0)]).collect(),
+        };
+        Ok(Self { points, torso })
     }
-    if missing.is_empty() {
-        return Ok(columns);
+
+    /// The points of a frame relative to the torso joint, metres; NaN where the sensor's confidence in the point or in
+    /// the torso joint is below `min_confidence`. Slices as long as the sensor's joints.
+    pub fn points(&self, frame: &[Vector3<f64>], confidence: &[f32], min_confidence: f32) -> Points {
+        let seen = |column: usize| {
+            let is_seen = is_trusted(confidence[column], min_confidence);
+            if is_seen { frame[column] } else { Vector3::repeat(f64::NAN) }
+        };
+        let torso = self.torso.iter().map(|column| seen(*column)).sum::<Vector3<f64>>() / self.torso.len() as f64;
+        self.points.map(|column| seen(column) - torso)
     }
-    let sentence = format!(
-        "joint angles need the joints {}, which this recording does not have; record them, or name them as in the \
-         recording format",
-        missing.join(", ")
-    );
-    Err(PipelineError::Unsuitable { code: "joints_missing", place: Some("joints".into()), sentence })
 }

@@ -4,7 +4,7 @@ use crate::assessment::JointAngleSettings;
 use crate::body::skeleton::point_index;
 use crate::body::{Joint, Limb, POINT_COUNT};
 use crate::pipeline::PipelineError;
-use crate::pipeline::joint_angles::observation::{Observations, SeenMask, is_trusted, point_columns};
+use crate::pipeline::joint_angles::observation::{Observations, PointColumns, SeenMask, is_trusted};
 use crate::pipeline::joint_angles::sensor_noise::white_noise;
 use crate::recording::SkeletonRecording;
 use nalgebra::Vector3;
@@ -48,7 +48,7 @@ impl<'a> Scene<'a> {
         Ok(Self {
             skeleton,
             min_confidence: settings.min_confidence,
-            columns: point_columns(skeleton)?,
+            columns: PointColumns::of(&skeleton.joints)?.points,
             white: white_noise(observations),
             observations: observations.clone(),
             repairs: Repairs { rejected: none.clone(), exchanged: none },
