@@ -123,7 +123,11 @@ fn print_summary(assessment: &Assessment, out: &mut dyn Write) -> anyhow::Result
         writeln!(out, "note ({}): {}", warning.code, warning.message)?;
     }
     for count in quality.event_counts.iter().filter(|count| count.n_events > 0) {
-        writeln!(out, "event {}: {} times, {} frames (--json has the times)", count.kind, count.n_events, count.n_frames)?;
+        writeln!(
+            out,
+            "event {}: {} times, {} frames (--json has the times)",
+            count.kind, count.n_events, count.n_frames
+        )?;
     }
     writeln!(out, "\n{:<34}{:>9}{:>9}{:>9}{:>9}{:>12}", "channel", "min", "max", "mean", "covered", "95 % width")?;
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
