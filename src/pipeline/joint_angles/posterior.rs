@@ -4,7 +4,7 @@ use super::observation::{SeenMask, sees_trunk};
 use crate::assessment::series::{FLAG_BRIDGED, FLAG_NOT_OBSERVABLE, FLAG_SINGULAR};
 use crate::assessment::{AngleChannel, Series};
 use crate::body::anatomical_angles::{
-    ANGLE_COUNT, Angles, angle_jacobian, angles_of_pose, arm_offset, leg_offset, unobservable_angles,
+    ANGLE_COUNT, Angles, angle_jacobian, angles_of_pose, arm_offset, elements_of_angle, leg_offset, unobservable_angles,
 };
 use crate::body::pose::{POSE_DIMENSION, Pose, PoseVector, attitude_offset};
 use crate::body::skeleton::point_index;
@@ -116,9 +116,11 @@ fn unwrap_angles(angles: &mut Angles, previous: &Angles) {
 /// Standard deviation of each anatomical angle, radians.
 fn angle_sd(pose: &Pose, covariance: &PoseCovariance) -> Angles {
     let jacobian = angle_jacobian(pose);
-    let spread = jacobian * covariance;
     Angles::from_fn(|angle, _| {
-        let variance = spread.row(angle).dot(&jacobian.row(angle));
+        // The sum runs over the few elements that the angle depends on, not over all 361 of the covariance.
+        let elements = elements_of_angle(angle);
+        let spread = |i: usize| elements.clone().map(|j| covariance[(i, j)] * jacobian[(angle, j)]).sum::<f64>();
+        let variance: f64 = elements.clone().map(|i| jacobian[(angle, i)] * spread(i)).sum();
         // An angle is at most half a turn off: beyond, "anything" is all that is known.
         variance.max(0.0).sqrt().min(std::f64::consts::PI)
     })
@@ -167,12 +169,16 @@ fn limb_angles(limb: Limb) -> std::ops::Range<usize> {
 
 /// Covariance of the error vector from that of the state vector θ around `theta`: `exp(v + δv) = exp(J δv) exp(v)`.
 pub fn error_covariance(theta: &PoseVector, covariance: &PoseCovariance) -> PoseCovariance {
-    let mut spread = PoseCovariance::identity();
+    // The derivative is the identity but for five blocks on its diagonal: each turns its rows and its columns.
+    let mut turned = *covariance;
     for offset in std::iter::once(0).chain((0..4).map(attitude_offset)) {
         let jacobian = left_jacobian(&theta.fixed_rows::<3>(offset).into_owned());
-        spread.fixed_view_mut::<3, 3>(offset, offset).copy_from(&jacobian);
+        let rows = jacobian * turned.fixed_rows::<3>(offset);
+        turned.fixed_rows_mut::<3>(offset).copy_from(&rows);
+        let columns = turned.fixed_columns::<3>(offset) * jacobian.transpose();
+        turned.fixed_columns_mut::<3>(offset).copy_from(&columns);
     }
-    spread * covariance * spread.transpose()
+    turned
 }
 
 #[cfg(test)]
@@ -197,6 +203,29 @@ mod tests {
         let series = series_of(&[posterior(Pose::reference(), ALL_SEEN)], "left_knee_flexion_deg");
         assert!((series.high[0] - series.low[0] - 2.0 * 1.96 * 0.573).abs() < 0.01);
         assert_eq!(series.flags, [0]);
+    }
+
+    /// A covariance in which every element is correlated with every other.
+    fn dense_covariance() -> PoseCovariance {
+        let factor =
+            PoseCovariance::from_fn(|i, j| 0.01 * ((i * 19 + j) as f64 * 1.7).sin() + f64::from(u8::from(i == j)));
+        factor * factor.transpose() * 1e-3
+    }
+
+    #[test]
+    fn the_spread_of_errors_is_that_of_the_full_matrix_products() {
+        let theta = PoseVector::from_fn(|i, _| (i as f64 * 2.3).sin());
+        let (pose, covariance) = (Pose::from_vector(&theta), dense_covariance());
+        let mut derivative = PoseCovariance::identity();
+        for offset in std::iter::once(0).chain((0..4).map(attitude_offset)) {
+            let block = left_jacobian(&theta.fixed_rows::<3>(offset).into_owned());
+            derivative.fixed_view_mut::<3, 3>(offset, offset).copy_from(&block);
+        }
+        let plain = derivative * covariance * derivative.transpose();
+        assert!((error_covariance(&theta, &covariance) - plain).abs().max() < 1e-17);
+        let jacobian = angle_jacobian(&pose);
+        let plain = (jacobian * covariance * jacobian.transpose()).diagonal().map(f64::sqrt);
+        assert!((angle_sd(&pose, &covariance) - plain).abs().max() < 1e-15);
     }
 
     #[test]
