@@ -6,6 +6,7 @@
 pub mod calibration;
 pub mod iekf;
 pub mod inverse_kinematics;
+mod likelihood_kernel;
 pub mod middleware;
 pub mod noise_model;
 pub mod observation;
