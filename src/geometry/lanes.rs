@@ -89,7 +89,7 @@ const SHIFT: f32 = 12_582_912.0;
 
 /// Sine and cosine in radians for |x| ≤ 100, to 2 · 10⁻⁷ absolute.
 ///
-/// Reduction by multiples of π/2 in three parts (Cody and Waite), then [`sin_cos_of_eighth`].
+/// Reduction by multiples of π/2 in three parts (Cody and Waite), then Taylor polynomials.
 #[inline(always)]
 pub fn sin_cos<S: Simd>(x: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
     // π/2 split so that quadrant × part is exact in f32 for the quadrants in range.
