@@ -60,7 +60,7 @@ fn kernels(criterion: &mut Criterion) {
     });
     let mut model = SkeletonParticleModel::new(&skeleton, NoiseModel::nite_table1(), &Rotation3::identity());
     let particles = Particles::at(posture(45).as_slice(), 512);
-    let mut log_likelihood = vec![0.0; 512];
+    let mut log_likelihood = vec![0.0f32; 512];
     group.throughput(Throughput::Elements(512));
     group.bench_function("forward_kinematics_and_likelihood_of_512_particles", |b| {
         b.iter(|| model.log_likelihood(black_box(&points), &particles, &mut log_likelihood));

@@ -88,11 +88,21 @@ pub fn angle_jacobian(pose: &Pose) -> SMatrix<f64, ANGLE_COUNT, POSE_DIMENSION> 
         }
     }
     for limb in Limb::ALL {
-        let start = if limb.is_arm() { arm_offset(limb.side()) } else { leg_offset(limb.side()) };
-        jacobian.fixed_view_mut::<1, POSE_DIMENSION>(start + 3, 0).fill(0.0);
-        jacobian[(start + 3, hinge_offset(limb.index()))] = 1.0;
+        jacobian.fixed_view_mut::<1, POSE_DIMENSION>(hinge_angle(limb), 0).fill(0.0);
+        jacobian[(hinge_angle(limb), hinge_offset(limb.index()))] = 1.0;
     }
     jacobian
+}
+
+/// Elements of the error vector of [`Pose::perturbed`] that an angle depends on: the hinge itself, or the three of its
+/// joint.
+pub fn elements_of_angle(angle: usize) -> std::ops::Range<usize> {
+    let joint = joint_of_angle(angle);
+    let hinge = Limb::ALL.into_iter().find(|limb| attitude_offset(limb.index()) == 3 * joint);
+    match hinge {
+        Some(limb) if hinge_angle(limb) == angle => hinge_offset(limb.index())..hinge_offset(limb.index()) + 1,
+        _ => 3 * joint..3 * joint + 3,
+    }
 }
 
 /// Limb rotation of the T-posture-based state of a hip whose anatomical angles are given (radians; flexion,
@@ -129,6 +139,11 @@ fn set(angles: &mut Angles, singular: &mut [bool], start: usize, values: [f64; 3
         angles[start + i] = value;
         singular[start + i] = is_singular;
     }
+}
+
+/// Angle of a limb's hinge, the last of the limb's four.
+fn hinge_angle(limb: Limb) -> usize {
+    3 + if limb.is_arm() { arm_offset(limb.side()) } else { leg_offset(limb.side()) }
 }
 
 /// Number of the attitude vector (trunk, then limbs) that an angle depends on.
@@ -255,6 +270,16 @@ mod tests {
             let change = angles_of_pose(&pose.perturbed(&error)).0 - angles_of_pose(&pose).0;
             let predicted = angle_jacobian(&pose) * error;
             prop_assert!((change - predicted).norm() < 1e-7, "{change} against {predicted}");
+        }
+
+        #[test]
+        fn an_angle_depends_on_its_elements_alone(theta in prop::array::uniform19(-0.6..0.6f64)) {
+            let jacobian = angle_jacobian(&Pose::from_vector(&PoseVector::from(theta)));
+            for angle in 0..ANGLE_COUNT {
+                for element in (0..POSE_DIMENSION).filter(|i| !elements_of_angle(angle).contains(i)) {
+                    prop_assert_eq!(jacobian[(angle, element)], 0.0);
+                }
+            }
         }
     }
 }

@@ -8,6 +8,7 @@ pub mod calibration;
 pub mod events;
 pub mod iekf;
 pub mod inverse_kinematics;
+mod likelihood_kernel;
 pub mod live;
 pub mod middleware;
 pub mod noise_model;

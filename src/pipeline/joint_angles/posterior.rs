@@ -1,7 +1,7 @@
 //! What an estimator knows of one frame.
 
 use super::observation::SeenMask;
-use crate::body::anatomical_angles::{Angles, angle_jacobian};
+use crate::body::anatomical_angles::{Angles, angle_jacobian, elements_of_angle};
 use crate::body::pose::{POSE_DIMENSION, Pose, PoseVector, attitude_offset};
 use crate::geometry::attitude::left_jacobian;
 use nalgebra::{Matrix3, SMatrix};
@@ -58,9 +58,11 @@ pub struct Spread {
 /// Standard deviation of each anatomical angle, radians.
 fn angle_sd(pose: &Pose, covariance: &PoseCovariance) -> Angles {
     let jacobian = angle_jacobian(pose);
-    let spread = jacobian * covariance;
     Angles::from_fn(|angle, _| {
-        let variance = spread.row(angle).dot(&jacobian.row(angle));
+        // The sum runs over the few elements that the angle depends on, not over all 361 of the covariance.
+        let elements = elements_of_angle(angle);
+        let spread = |i: usize| elements.clone().map(|j| covariance[(i, j)] * jacobian[(angle, j)]).sum::<f64>();
+        let variance: f64 = elements.clone().map(|i| jacobian[(angle, i)] * spread(i)).sum();
         // An angle is at most half a turn off: beyond, "anything" is all that is known.
         variance.max(0.0).sqrt().min(std::f64::consts::PI)
     })
@@ -68,10 +70,42 @@ fn angle_sd(pose: &Pose, covariance: &PoseCovariance) -> Angles {
 
 /// Covariance of the error vector from that of the state vector θ around `theta`: `exp(v + δv) = exp(J δv) exp(v)`.
 pub fn error_covariance(theta: &PoseVector, covariance: &PoseCovariance) -> PoseCovariance {
-    let mut spread = PoseCovariance::identity();
+    // The derivative is the identity but for five blocks on its diagonal: each turns its rows and its columns.
+    let mut turned = *covariance;
     for offset in std::iter::once(0).chain((0..4).map(attitude_offset)) {
         let jacobian = left_jacobian(&theta.fixed_rows::<3>(offset).into_owned());
-        spread.fixed_view_mut::<3, 3>(offset, offset).copy_from(&jacobian);
+        let rows = jacobian * turned.fixed_rows::<3>(offset);
+        turned.fixed_rows_mut::<3>(offset).copy_from(&rows);
+        let columns = turned.fixed_columns::<3>(offset) * jacobian.transpose();
+        turned.fixed_columns_mut::<3>(offset).copy_from(&columns);
     }
-    spread * covariance * spread.transpose()
+    turned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A covariance in which every element is correlated with every other.
+    fn dense_covariance() -> PoseCovariance {
+        let factor =
+            PoseCovariance::from_fn(|i, j| 0.01 * ((i * 19 + j) as f64 * 1.7).sin() + f64::from(u8::from(i == j)));
+        factor * factor.transpose() * 1e-3
+    }
+
+    #[test]
+    fn the_spread_of_errors_is_that_of_the_full_matrix_products() {
+        let theta = PoseVector::from_fn(|i, _| (i as f64 * 2.3).sin());
+        let (pose, covariance) = (Pose::from_vector(&theta), dense_covariance());
+        let mut derivative = PoseCovariance::identity();
+        for offset in std::iter::once(0).chain((0..4).map(attitude_offset)) {
+            let block = left_jacobian(&theta.fixed_rows::<3>(offset).into_owned());
+            derivative.fixed_view_mut::<3, 3>(offset, offset).copy_from(&block);
+        }
+        let plain = derivative * covariance * derivative.transpose();
+        assert!((error_covariance(&theta, &covariance) - plain).abs().max() < 1e-17);
+        let jacobian = angle_jacobian(&pose);
+        let plain = (jacobian * covariance * jacobian.transpose()).diagonal().map(f64::sqrt);
+        assert!((angle_sd(&pose, &covariance) - plain).abs().max() < 1e-15);
+    }
 }
