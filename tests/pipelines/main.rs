@@ -1,6 +1,7 @@
 //! Whole pipelines on recordings with known truth.
 
 mod support;
+mod training;
 
 use support::{centimetres, exercise, mean_absolute_error, mirrored, series, without};
 use surefoot::assessment::series::FLAG_BRIDGED;

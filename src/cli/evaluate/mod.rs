@@ -2,9 +2,11 @@
 
 mod table;
 
+use super::noise_model::NoiseModelChoice;
 use crate::assessment::JointAngleSettings;
 use crate::evaluation::joint_angles::evaluate;
 use crate::evaluation::{Contender, Evaluation, Trial, TrialSource};
+use crate::pipeline::Inputs;
 use crate::recording::import::{Dataset, ImportError, list};
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 use anyhow::bail;
@@ -58,6 +60,10 @@ struct JointAngleArgs {
     /// Seed of the methods' random streams
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Noise of the sensor for methods that take any: adaptive, nite-table1, kinect-v1, kinect-v2, or the file of a
+    /// trained model; each method's own choice when absent
+    #[arg(long, value_name = "NAME|FILE")]
+    noise_model: Option<NoiseModelChoice>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -78,9 +84,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 fn joint_angles(args: &JointAngleArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let sources = if args.simulated { simulated(args.noise, args.seeds) } else { imported(&args.data)? };
-    let settings = JointAngleSettings { particles: args.particles, seed: args.seed, ..JointAngleSettings::default() };
+    let settings = JointAngleSettings {
+        particles: args.particles,
+        seed: args.seed,
+        noise_model: args.noise_model.as_ref().map(NoiseModelChoice::name),
+        ..JointAngleSettings::default()
+    };
+    let inputs = Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model) };
     let bar = progress_bar(sources.len() as u64);
-    let evaluation = evaluate(&sources, &args.methods, &settings, || bar.inc(1));
+    let evaluation = evaluate(&sources, &args.methods, &settings, &inputs, || bar.inc(1));
     bar.finish_and_clear();
     for failure in &evaluation.failures {
         eprintln!("failed: {} ({}): {}", failure.trial, failure.method.unwrap_or("loading"), failure.reason);
@@ -113,6 +125,7 @@ fn document(args: &JointAngleArgs, evaluation: &Evaluation) -> serde_json::Value
         "data": data,
         "particles": args.particles,
         "seed": args.seed,
+        "noise_model": args.noise_model.as_ref().map(NoiseModelChoice::name),
         "machine": machine(),
         "version": env!("CARGO_PKG_VERSION"),
     });

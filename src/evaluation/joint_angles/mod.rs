@@ -9,7 +9,7 @@ use super::trial::TrialSource;
 use crate::assessment::series::{FLAG_BRIDGED, FLAG_NOT_OBSERVABLE};
 use crate::assessment::{AngleChannel, Assessment, JointAngleSettings, Settings};
 use crate::body::Side;
-use crate::pipeline;
+use crate::pipeline::{self, Inputs};
 use crate::progress::Monitor;
 use crate::recording::Recording;
 use rayon::prelude::*;
@@ -49,12 +49,13 @@ pub fn evaluate(
     sources: &[TrialSource],
     contenders: &[Contender],
     settings: &JointAngleSettings,
+    inputs: &Inputs,
     done: impl Fn() + Sync,
 ) -> Evaluation {
     let outcomes: Vec<TrialOutcome> = sources
         .par_iter()
         .map(|source| {
-            let outcome = evaluate_trial(source, contenders, settings);
+            let outcome = evaluate_trial(source, contenders, settings, inputs);
             done();
             outcome
         })
@@ -79,7 +80,12 @@ pub struct Compared {
     pub errors: Vec<FrameErrors>,
 }
 
-fn evaluate_trial(source: &TrialSource, contenders: &[Contender], settings: &JointAngleSettings) -> TrialOutcome {
+fn evaluate_trial(
+    source: &TrialSource,
+    contenders: &[Contender],
+    settings: &JointAngleSettings,
+    inputs: &Inputs,
+) -> TrialOutcome {
     let name = source.name.clone();
     match (source.load)() {
         Err(reason) => TrialOutcome { name, place: Err(reason), results: Vec::new() },
@@ -89,23 +95,31 @@ fn evaluate_trial(source: &TrialSource, contenders: &[Contender], settings: &Joi
             if !trial.recording.references.iter().any(|reference| measured(&reference.channel)) {
                 return TrialOutcome { name, place: Ok((trial.dataset, trial.exercise)), results: Vec::new() };
             }
-            let results = contenders.iter().map(|contender| compare(&trial.recording, *contender, settings)).collect();
+            let results =
+                contenders.iter().map(|contender| compare(&trial.recording, *contender, settings, inputs)).collect();
             TrialOutcome { name, place: Ok((trial.dataset, trial.exercise)), results }
         }
     }
 }
 
-/// Runs one contender on a recording and compares every measure that has a reference.
+/// Runs one contender on a recording and compares every measure that has a reference. A noise model in the settings is for
+/// the methods that take one; the others run without.
 ///
 /// # Errors
 /// The sentence with which the pipeline refused the recording.
-pub fn compare(recording: &Recording, contender: Contender, settings: &JointAngleSettings) -> Result<Compared, String> {
+pub fn compare(
+    recording: &Recording,
+    contender: Contender,
+    settings: &JointAngleSettings,
+    inputs: &Inputs,
+) -> Result<Compared, String> {
     match contender {
         Contender::Raw => Ok(Compared { comparisons: compare_raw(recording), errors: Vec::new() }),
         Contender::Method(method) => {
-            let settings = Settings::JointAngles(JointAngleSettings { method, ..settings.clone() });
-            let assessment =
-                pipeline::assess(recording, &settings, &Monitor::default()).map_err(|error| error.to_string())?;
+            let noise_model = settings.noise_model.clone().filter(|_| method.default_noise_model().is_some());
+            let settings = Settings::JointAngles(JointAngleSettings { method, noise_model, ..settings.clone() });
+            let assessment = pipeline::assess_with(recording, &settings, inputs, &Monitor::default())
+                .map_err(|error| error.to_string())?;
             let errors = frame_errors(recording, &assessment);
             Ok(Compared { comparisons: compare_assessment(recording, &assessment), errors })
         }

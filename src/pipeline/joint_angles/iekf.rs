@@ -4,6 +4,7 @@
 use super::calibration::Calibration;
 use super::observation::Observations;
 use super::posterior::Posterior;
+use super::sensor_noise::SensorNoise;
 use super::state_space::{StateSpace, Tuning};
 use crate::assessment::settings::Pass;
 use crate::estimation::rate_smoother::RateFilter;
@@ -17,13 +18,14 @@ use crate::progress::{Monitor, Step};
 pub fn run(
     observations: &Observations,
     calibration: &Calibration,
+    noise: &SensorNoise,
     tuning: &Tuning,
     pass: Pass,
     monitor: &Monitor,
     mut emit: impl FnMut(&Posterior),
 ) -> Result<(), PipelineError> {
     monitor.begin(Step::Estimating, observations.len() as u64)?;
-    let model = StateSpace::new(observations, calibration, tuning);
+    let model = StateSpace::new(observations, calibration, noise, tuning);
     let mut filter = RateFilter::new(model.initial_pose(), tuning.rates);
     for t in 0..observations.len() {
         let frame = filter.step(&model, t, observations.interval_s(t));

@@ -9,7 +9,7 @@ use super::calibration::Calibration;
 use super::inverse_kinematics::pose_from_points;
 use super::observation::{ALL_SEEN, Observations};
 use super::posterior::{PoseCovariance, Posterior};
-use super::sensor_noise::{slow_offset, white_noise};
+use super::sensor_noise::SensorNoise;
 use crate::assessment::series::FLAG_OUTLIER;
 use crate::body::kinematics::{forward_kinematics, forward_kinematics_with_jacobian};
 use crate::body::pose::{POSE_DIMENSION, PoseVector, attitude_offset, hinge_offset};
@@ -73,11 +73,15 @@ pub struct StateSpace<'a> {
 }
 
 impl<'a> StateSpace<'a> {
-    /// The model of a calibrated subject; its noise is estimated from the observations.
-    pub fn new(observations: &'a Observations, calibration: &'a Calibration, tuning: &'a Tuning) -> Self {
+    /// The model of a calibrated subject before a sensor of some noise.
+    pub fn new(
+        observations: &'a Observations,
+        calibration: &'a Calibration,
+        noise: &SensorNoise,
+        tuning: &'a Tuning,
+    ) -> Self {
         let skeleton = &calibration.skeleton;
-        let white = white_noise(observations);
-        let slow_offset = slow_offset(observations, &white);
+        let (white, slow_offset) = (noise.white, noise.slow_offset);
         let model_variance = slow_offset.clamp(tuning.model_sd[0], tuning.model_sd[1]).powi(2);
         let precision = white.map(|white| white.map(|sd| 1.0 / (sd.powi(2) + model_variance)));
         Self { observations, skeleton, tuning, precision, slow_offset }
@@ -257,7 +261,7 @@ mod tests {
         let tuning = Tuning::default();
         let quality = CalibrationQuality { source: "test".into(), window_s: None, n_frames: 1, segments: Vec::new() };
         let calibration = Calibration { skeleton: skeleton.clone(), quality, warnings: Vec::new() };
-        let model = StateSpace::new(&observations, &calibration, &tuning);
+        let model = StateSpace::new(&observations, &calibration, &SensorNoise::adaptive(&observations), &tuning);
         let (_, jacobian) = forward_kinematics_with_jacobian(&skeleton, &truth);
         let (information, gradient) = model.information(0, &truth);
         let mut expected = PoseCovariance::zeros();
