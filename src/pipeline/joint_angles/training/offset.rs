@@ -7,6 +7,9 @@
 //! Var φ = s² (2/a² + 2/b² + 2 cos φ / (a b)),   a, b: lengths of the two bones
 //! ```
 //!
+//! The angle is that of the points' mean places in a third of a second, and what is left of white noise in them is
+//! subtracted.
+//!
 //! Elsewhere it is taken from how much bones change in length between blocks of time, as for one recording. Of several
 //! recordings the median counts: a Kinect v1 loses the hips of a person who sits (UTD-MHAD: thighs that change by 12 %),
 //! and one such exercise must not speak for all.
@@ -19,8 +22,9 @@ use crate::body::{Limb, POINT_COUNT};
 use crate::geometry::three_point::flexion_of_three_points;
 use crate::recording::{Recording, ReferenceSeries};
 use crate::signal::interpolation::interpolate;
+use nalgebra::Vector3;
 
-/// Frames whose mean error counts once, so that white noise does not.
+/// Frames whose points are averaged, so that white noise hardly counts.
 const BLOCK_FRAMES: usize = 10;
 /// Blocks of a reference without which the bones are asked.
 const MIN_BLOCKS: u64 = 30;
@@ -32,7 +36,7 @@ const MIN_BONE_M: f64 = 0.05;
 pub(super) struct Offsets {
     /// Variance of the length of proximal and distal bones in each recording, m².
     length_variances: [[Vec<f64>; 2]; 2],
-    /// Sum of squared errors of the hinge angle, rad².
+    /// Sum of squared errors of the hinge angle, rad², less what white noise makes of them.
     squared_error: [f64; 2],
     /// Sum of what an offset of one metre would make of them.
     leverage: [f64; 2],
@@ -46,7 +50,8 @@ fn group(limb: Limb) -> usize {
 impl Offsets {
     /// Adds a recording of a movement.
     pub(super) fn add(&mut self, recording: &Recording, observations: &Observations) {
-        let variances = length_variances(observations, &white_noise(observations));
+        let white = white_noise(observations);
+        let variances = length_variances(observations, &white);
         for (bone, variance) in variances.into_iter().enumerate() {
             self.length_variances[group(Limb::ALL[bone / 2])][bone % 2].extend(variance);
         }
@@ -54,33 +59,45 @@ impl Offsets {
             let channel = if limb.is_arm() { AngleChannel::ElbowFlexion } else { AngleChannel::KneeFlexion };
             let channel = channel(limb.side()).name();
             if let Some(reference) = recording.references.iter().find(|reference| reference.channel == channel) {
-                self.add_hinge(limb, reference, observations);
+                self.add_hinge(limb, reference, observations, &white);
             }
         }
     }
 
-    fn add_hinge(&mut self, limb: Limb, reference: &ReferenceSeries, observations: &Observations) {
-        let [a, b, c] = std::array::from_fn(|level| point_index(limb, level));
+    fn add_hinge(
+        &mut self,
+        limb: Limb,
+        reference: &ReferenceSeries,
+        observations: &Observations,
+        white: &[Vector3<f64>; POINT_COUNT],
+    ) {
+        let columns: [usize; 3] = std::array::from_fn(|level| point_index(limb, level));
         let group = group(limb);
         for start in (0..observations.len()).step_by(BLOCK_FRAMES) {
-            let (mut error, mut leverage, mut count) = (0.0, 0.0, 0.0);
+            let (mut places, mut truth, mut count) = ([Vector3::zeros(); 3], 0.0, 0.0);
             for t in start..(start + BLOCK_FRAMES).min(observations.len()) {
-                let points = &observations.points[t];
                 let time = observations.time_ns[t] - reference.clock_offset_ns;
-                let truth = interpolate(&reference.time_ns, &reference.values, time).to_radians();
-                let angle = flexion_of_three_points(&points[a], &points[b], &points[c]);
-                let (upper, lower) = ((points[b] - points[a]).norm(), (points[c] - points[b]).norm());
-                if (angle - truth).is_finite() && upper > MIN_BONE_M && lower > MIN_BONE_M {
-                    error += angle - truth;
-                    leverage += 2.0 / upper.powi(2) + 2.0 / lower.powi(2) + 2.0 * angle.cos() / (upper * lower);
+                let angle = interpolate(&reference.time_ns, &reference.values, time).to_radians();
+                let points = columns.map(|p| observations.points[t][p]);
+                if angle.is_finite() && points.iter().all(|point| point.x.is_finite()) {
+                    places.iter_mut().zip(points).for_each(|(sum, point)| *sum += point);
+                    truth += angle;
                     count += 1.0;
                 }
             }
-            if 2.0 * count > BLOCK_FRAMES as f64 {
-                self.squared_error[group] += (error / count).powi(2);
-                self.leverage[group] += leverage / count;
-                self.blocks[group] += 1;
+            let [a, b, c] = places.map(|sum| sum / count);
+            let (upper, lower) = ((b - a).norm(), (c - b).norm());
+            let is_known = 2.0 * count > BLOCK_FRAMES as f64 && upper > MIN_BONE_M && lower > MIN_BONE_M;
+            if !is_known {
+                continue;
             }
+            let angle = flexion_of_three_points(&a, &b, &c);
+            let (proximal, distal) = (upper.powi(-2), lower.powi(-2));
+            let leverage = [proximal, proximal + distal + 2.0 * angle.cos() / (upper * lower), distal];
+            let by_white = columns.iter().zip(leverage).map(|(p, by)| by * white[*p].norm_squared() / 3.0 / count);
+            self.squared_error[group] += (angle - truth / count).powi(2) - by_white.sum::<f64>();
+            self.leverage[group] += leverage.iter().sum::<f64>();
+            self.blocks[group] += 1;
         }
     }
 
@@ -104,7 +121,7 @@ impl Offsets {
             let variance = |part: usize| median(&self.length_variances[group][part]);
             for level in 0..3 {
                 offsets[point_index(limb, level)] = if self.source(limb.is_arm()) == "reference" {
-                    (self.squared_error[group] / self.leverage[group]).sqrt()
+                    (self.squared_error[group].max(0.0) / self.leverage[group]).sqrt()
                 } else {
                     offset_of_length_variance(match level {
                         0 => variance(0),
@@ -129,7 +146,7 @@ fn median(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::estimation::random::RandomStreams;
-    use nalgebra::{Rotation3, Vector3};
+    use nalgebra::Rotation3;
 
     /// Legs bent by an angle, whose points are displaced anew every second by an offset of an SD in metres.
     fn bent_legs(flexion: f64, sd: f64, seconds: usize) -> (Recording, Observations) {
@@ -168,6 +185,19 @@ mod tests {
             // 800 independent offsets: a standard error of 2.5 %, and the curvature of the angle.
             assert!((found / 0.02 - 1.0).abs() < 0.1, "{flexion}: {found}");
         }
+    }
+
+    #[test]
+    fn white_noise_is_no_slow_offset() {
+        let (recording, mut observations) = bent_legs(1.0, 0.0, 60);
+        let mut streams = RandomStreams::new(4);
+        for frame in &mut observations.points {
+            frame.iter_mut().for_each(|point| *point += Vector3::from_fn(|_, _| 0.03 * streams.normal()));
+        }
+        let mut offsets = Offsets::default();
+        offsets.add(&recording, &observations);
+        let found = offsets.standard_deviations()[point_index(Limb::LeftLeg, 1)];
+        assert!(found < 0.004, "{found}");
     }
 
     #[test]
