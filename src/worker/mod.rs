@@ -41,8 +41,8 @@ pub type Assess = dyn Fn(BlobReader, &StoredRecording, &Settings, &Inputs, &Moni
 
 /// What an attempt came to.
 enum Outcome {
-    Assessment(Assessment),
-    NoiseModel(NoiseModel),
+    Assessment(Box<Assessment>),
+    NoiseModel(Box<NoiseModel>),
 }
 
 /// What one look at the queue came to.
@@ -153,9 +153,13 @@ impl Worker {
         match &job.settings {
             Settings::JointAngles(settings) => {
                 let inputs = self.inputs(job, settings).await?;
-                self.assessment(job, inputs, monitor).await.map(Outcome::Assessment)
+                let assessment = self.assessment(job, inputs, monitor).await?;
+                Ok(Outcome::Assessment(Box::new(assessment)))
             }
-            Settings::NoiseModel(settings) => self.noise_model(job, settings, monitor).await.map(Outcome::NoiseModel),
+            Settings::NoiseModel(settings) => {
+                let model = self.noise_model(job, settings, monitor).await?;
+                Ok(Outcome::NoiseModel(Box::new(model)))
+            }
         }
     }
 
@@ -239,12 +243,12 @@ impl Worker {
         // A request to stop that comes now is too late: the result is there.
         let _ = monitor.begin(Step::Saving, 1);
         let saved = match outcome {
-            Outcome::Assessment(assessment) => match self.queue.finish(job.id, job.attempt, assessment).await {
+            Outcome::Assessment(assessment) => match self.queue.finish(job.id, job.attempt, *assessment).await {
                 Ok(Finish::Saved(assessment)) => Ok(Some(assessment.0)),
                 Ok(Finish::Lost) => Ok(None),
                 Err(error) => Err(error),
             },
-            Outcome::NoiseModel(model) => match self.queue.finish_training(job.id, job.attempt, model).await {
+            Outcome::NoiseModel(model) => match self.queue.finish_training(job.id, job.attempt, *model).await {
                 Ok(Trained::Saved(model)) => Ok(Some(model.0)),
                 Ok(Trained::Lost) => Ok(None),
                 Err(error) => Err(error),
