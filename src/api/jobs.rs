@@ -9,7 +9,7 @@ use super::state::AppState;
 use crate::assessment::Settings;
 use crate::progress::Progress;
 use crate::queue::{Job, JobError, JobFilter, JobState};
-use crate::storage::{Access, AssessmentId, JobId, PageRequest, RecordingId, SessionId};
+use crate::storage::{Access, AssessmentId, JobId, NoiseModelId, PageRequest, RecordingId, SessionId};
 use axum::Json;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -39,12 +39,12 @@ pub fn events_router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(read_job_events))
 }
 
-/// The work on one recording.
+/// The work on one recording, or on several that make a noise model.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct JobResponse {
     /// Identity.
     pub id: JobId,
-    /// The recording that is assessed.
+    /// The recording that is assessed; of a training the first static one.
     pub recording_id: RecordingId,
     /// The recording's session.
     pub session_id: SessionId,
@@ -62,8 +62,10 @@ pub struct JobResponse {
     pub settings: Settings,
     /// Why the latest attempt failed.
     pub error: Option<JobError>,
-    /// The result, once the job is done.
+    /// The assessment, once the job is done.
     pub assessment_id: Option<AssessmentId>,
+    /// The noise model, once a training is done.
+    pub noise_model_id: Option<NoiseModelId>,
     /// When it was asked for.
     #[serde(with = "time::serde::rfc3339")]
     pub queued_at: OffsetDateTime,
@@ -89,6 +91,7 @@ impl From<Job> for JobResponse {
             settings: job.settings,
             error: job.error,
             assessment_id: job.assessment_id,
+            noise_model_id: job.noise_model_id,
             queued_at: job.queued_at,
             started_at: job.started_at,
             finished_at: job.finished_at,

@@ -13,6 +13,7 @@ pub mod etag;
 pub mod health;
 pub mod jobs;
 pub mod metrics;
+pub mod noise_models;
 pub mod observe;
 mod openapi;
 pub mod page;
@@ -79,6 +80,7 @@ fn documented_routes() -> OpenApiRouter<AppState> {
         .merge(jobs::router())
         .merge(assessments::router())
         .merge(series::router())
+        .merge(noise_models::router())
         .merge(clients::router())
         .merge(health::router())
         .merge(metrics::router())

@@ -17,6 +17,9 @@ the assessment that the finished job names.
 role: `device` uploads and sees its own sessions, `clinician` sees the patients of the organisation, `admin` makes and \
 revokes keys. What belongs to another organisation does not exist: 404.
 
+**Noise models** say how far a sensor is off. Settings name one that is shipped, or one that the organisation trained \
+(`POST /v1/noise-models`); a session may name the one of its sensor.
+
 **Refusals** are problem documents (RFC 9457, `application/problem+json`) with a stable `code`, a sentence for a \
 person, and the paths of the fields concerned.
 
@@ -34,6 +37,7 @@ person, and the paths of the fields concerned.
         (name = "recordings", description = "Uploads and their bytes"),
         (name = "jobs", description = "The work on a recording"),
         (name = "assessments", description = "What was found in a recording"),
+        (name = "noise models", description = "Noise of sensors, shipped and trained"),
         (name = "clients", description = "Holders of keys"),
         (name = "health", description = "For the operator"),
     )
@@ -191,13 +195,15 @@ fn name_contents(document: &mut Value) {
 }
 
 /// Where the ids of an answer lead: (operation, status, place of the id in the body, operations that take it as `id`).
-const LINKS: [(&str, &str, &str, &[&str]); 8] = [
+const LINKS: [(&str, &str, &str, &[&str]); 10] = [
     ("create_patient", "201", "/id", &["read_patient", "update_patient"]),
     ("create_session", "201", "/id", &["read_session", "list_recordings", "upload_recording"]),
     ("create_client", "201", "/client/id", &["revoke_client"]),
     ("upload_recording", "202", "/recording/id", &["read_recording", "read_recording_content", "create_job"]),
     ("upload_recording", "202", "/job/id", &["read_job", "read_job_events", "cancel_job"]),
     ("create_job", "202", "/id", &["read_job", "read_job_events", "cancel_job"]),
+    ("create_noise_model", "202", "/id", &["read_job", "read_job_events", "cancel_job"]),
+    ("read_job", "200", "/noise_model_id", &["read_noise_model"]),
     ("read_job", "200", "/assessment_id", &["read_assessment", "read_series"]),
     ("list_assessments", "200", "/items/0/id", &["read_assessment", "read_series"]),
 ];

@@ -4,6 +4,7 @@ use super::auth::Caller;
 use super::error::ApiError;
 use super::etag::{ETag, tagged_json};
 use super::jobs::JobResponse;
+use super::noise_models::pinned;
 use super::page::{DEFAULT_LIMIT, Page, PageLink, id_from_cursor};
 use super::request::{ApiJson, ApiPath, ApiQuery};
 use super::sessions::SessionPath;
@@ -107,7 +108,13 @@ impl Validate for JobRequest {
     type Context = ();
 
     fn validate_into(&self, _: &(), parent: &mut dyn FnMut() -> garde::Path, report: &mut garde::Report) {
-        let Settings::JointAngles(settings) = &self.0;
+        let settings = match &self.0 {
+            Settings::JointAngles(settings) => settings,
+            Settings::NoiseModel(_) => {
+                let message = "must be joint_angles; noise models are trained by POST /v1/noise-models";
+                return report.append(parent().join("pipeline"), garde::Error::new(message));
+            }
+        };
         if !(16..=65_536).contains(&settings.particles) {
             report.append(parent().join("particles"), garde::Error::new("must lie between 16 and 65536"));
         }
@@ -116,6 +123,9 @@ impl Validate for JobRequest {
         }
         if let Err(error) = settings.chosen_pass() {
             report.append(parent().join("pass"), garde::Error::new(error.to_string()));
+        }
+        if let Err(error) = settings.chosen_noise_model() {
+            report.append(parent().join("noise_model"), garde::Error::new(error.to_string()));
         }
         if settings.seed > MAX_SEED {
             report.append(parent().join("seed"), garde::Error::new(format!("must be at most {MAX_SEED}")));
@@ -211,6 +221,10 @@ async fn create_job(
     ApiPath(path): ApiPath<RecordingPath>,
     ApiJson(JobRequest(settings)): ApiJson<JobRequest>,
 ) -> Result<Response, ApiError> {
+    let settings = match settings {
+        Settings::JointAngles(settings) => Settings::JointAngles(pinned(&state, &caller.access, settings).await?),
+        other => other,
+    };
     let job = state.queue.enqueue(&caller.access, path.id, &settings).await?;
     let location = format!("/v1/jobs/{}", job.id);
     Ok((StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(JobResponse::from(job))).into_response())

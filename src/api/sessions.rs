@@ -3,6 +3,7 @@
 use super::auth::Caller;
 use super::error::ApiError;
 use super::etag::tagged_json;
+use super::noise_models::pinned_name;
 use super::page::{DEFAULT_LIMIT, Page, PageLink, id_from_cursor};
 use super::request::{ApiJson, ApiPath, ApiQuery};
 use super::state::AppState;
@@ -43,6 +44,12 @@ pub struct SessionRequest {
     #[garde(length(chars, max = 2000), custom(text::line))]
     #[schema(max_length = 2000, pattern = "^[^\\u0000-\\u001f\\u007f]*$")]
     pub notes: Option<String>,
+    /// Noise model of the sensor: `adaptive`, a shipped one, or one that the organisation trained, as `name` or
+    /// `name@version`. The first assessment of each recording takes it; without a version, the newest at the time of the
+    /// upload. Null means the method's own choice.
+    #[garde(skip)]
+    #[schema(pattern = "^[a-z][a-z0-9-]{0,63}(@[1-9][0-9]{0,9})?$", example = "kinect-v2")]
+    pub noise_model: Option<String>,
 }
 
 /// A session.
@@ -61,6 +68,8 @@ pub struct SessionResponse {
     pub protocol: Option<String>,
     /// Remarks.
     pub notes: Option<String>,
+    /// Noise model of the sensor, as settings name it.
+    pub noise_model: Option<String>,
     /// When it was made known.
     #[serde(with = "time::serde::rfc3339")]
     pub created_at: OffsetDateTime,
@@ -68,8 +77,8 @@ pub struct SessionResponse {
 
 impl From<Session> for SessionResponse {
     fn from(session: Session) -> Self {
-        let Session { id, patient_id, created_by, started_at, protocol, notes, created_at } = session;
-        Self { id, patient_id, created_by, started_at, protocol, notes, created_at }
+        let Session { id, patient_id, created_by, started_at, protocol, notes, noise_model, created_at } = session;
+        Self { id, patient_id, created_by, started_at, protocol, notes, noise_model, created_at }
     }
 }
 
@@ -114,9 +123,12 @@ async fn create_session(
     caller: Caller,
     ApiJson(request): ApiJson<SessionRequest>,
 ) -> Result<Response, ApiError> {
-    let SessionRequest { patient_id, started_at, protocol, notes } = request;
+    let SessionRequest { patient_id, started_at, protocol, notes, noise_model } = request;
+    if let Some(name) = &noise_model {
+        pinned_name(&state, &caller.access, name).await?;
+    }
     let started_at = started_at.unwrap_or_else(|| state.store.now());
-    let new = NewSession { patient_id, started_at, protocol, notes };
+    let new = NewSession { patient_id, started_at, protocol, notes, noise_model };
     let session = state.store.create_session(&caller.access, &new).await?;
     let location = format!("/v1/sessions/{}", session.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(SessionResponse::from(session))).into_response())

@@ -2,16 +2,18 @@
 //! or of a database.
 
 pub mod joint_angles;
+pub mod noise_model;
 pub mod provenance;
 pub mod quality;
 pub mod series;
 pub mod settings;
 
 pub use joint_angles::AngleChannel;
+pub use noise_model::{NoiseModel, NoiseModelName, NoiseModelReference};
 pub use provenance::Provenance;
 pub use quality::{Event, Quality, Warning};
 pub use series::{ChannelSummary, Series};
-pub use settings::{JointAngleSettings, Method, Pass, Settings};
+pub use settings::{JointAngleSettings, Method, NoiseModelSettings, Pass, Settings};
 
 /// One pipeline's result on one recording.
 #[derive(Debug, Clone, PartialEq)]

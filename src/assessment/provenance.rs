@@ -1,5 +1,6 @@
 //! What is needed to compute the same bytes again.
 
+use super::noise_model::NoiseModelReference;
 use super::settings::Settings;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -15,6 +16,9 @@ pub struct Provenance {
     pub method: String,
     /// All settings, defaults filled in.
     pub settings: Settings,
+    /// The noise model that the result rests on; null for a method that has none.
+    #[serde(default)]
+    pub noise_model: Option<NoiseModelReference>,
     /// Seed of the random streams.
     pub seed: u64,
     /// SHA-256 of the uploaded bytes, lower-case hexadecimal; empty when the recording did not come from bytes.

@@ -1,10 +1,12 @@
 //! What can be asked of a pipeline. Settings stand with the result because they are part of its provenance, and because
 //! whoever asks for an assessment need not know the pipeline.
 
+use super::noise_model::{ADAPTIVE, InvalidNoiseModelName, NITE_TABLE1, NoiseModelName};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 use utoipa::ToSchema;
+use uuid::Uuid;
 
 /// How joint angles are estimated. All methods share one body model and one form of result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
@@ -32,6 +34,15 @@ impl Method {
     /// True of methods whose accuracy and cost depend on a number of particles.
     pub fn has_particles(self) -> bool {
         matches!(self, Method::Particle)
+    }
+
+    /// The noise model that the method takes when the settings name none; `None` when it has no model of noise.
+    pub fn default_noise_model(self) -> Option<&'static str> {
+        match self {
+            Method::Iekf => Some(ADAPTIVE),
+            Method::Particle => Some(NITE_TABLE1),
+            Method::Ik | Method::Nite => None,
+        }
     }
 
     /// Name in settings, tables and provenance.
@@ -97,6 +108,8 @@ impl fmt::Display for Method {
 pub enum Settings {
     /// Joint angles from skeleton positions.
     JointAngles(JointAngleSettings),
+    /// Training of a noise model from several recordings.
+    NoiseModel(NoiseModelSettings),
 }
 
 impl Default for Settings {
@@ -123,11 +136,16 @@ pub struct JointAngleSettings {
     /// Joints in which the sensor's confidence is lower count as not seen, 0 to 1.
     #[schema(minimum = 0, maximum = 1)]
     pub min_confidence: f32,
+    /// Noise of the sensor: `adaptive` (estimated from the recording itself), a shipped model, or a trained one of the
+    /// organisation, each as `name` or `name@version`; without a version the newest at the time of the request. Null
+    /// means the method's own choice: `adaptive` for `iekf`, `nite-table1` for `particle`.
+    #[schema(pattern = "^[a-z][a-z0-9-]{0,63}(@[1-9][0-9]{0,9})?$", example = "kinect-v2")]
+    pub noise_model: Option<String>,
 }
 
 impl Default for JointAngleSettings {
     fn default() -> Self {
-        Self { method: Method::Iekf, pass: None, particles: 512, seed: 1, min_confidence: 0.3 }
+        Self { method: Method::Iekf, pass: None, particles: 512, seed: 1, min_confidence: 0.3, noise_model: None }
     }
 }
 
@@ -143,6 +161,57 @@ impl JointAngleSettings {
             None => Ok(if self.method.can_smooth() { Pass::Smooth } else { Pass::Filter }),
         }
     }
+
+    /// The noise model that the method runs on: the one asked for, or its own choice; `None` for methods without one.
+    ///
+    /// # Errors
+    /// [`UnusableNoiseModel`] when the text is no name, or the method cannot run on it.
+    pub fn chosen_noise_model(&self) -> Result<Option<NoiseModelName>, UnusableNoiseModel> {
+        let Some(own) = self.method.default_noise_model() else {
+            return if self.noise_model.is_some() { Err(UnusableNoiseModel::NoneTaken(self.method)) } else { Ok(None) };
+        };
+        let name: NoiseModelName = self.noise_model.as_deref().unwrap_or(own).parse()?;
+        if name.name == ADAPTIVE && (name.version.is_some() || own != ADAPTIVE) {
+            return Err(UnusableNoiseModel::NotAdaptive(self.method));
+        }
+        Ok(Some(name))
+    }
+}
+
+/// A noise model that a method cannot run on.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum UnusableNoiseModel {
+    /// The text is no name.
+    #[error(transparent)]
+    InvalidName(#[from] InvalidNoiseModelName),
+    /// The method has no model of noise.
+    #[error("the method `{0}` has no model of noise; leave the noise model out, or choose the method iekf or particle")]
+    NoneTaken(Method),
+    /// The method needs a trained model.
+    #[error(
+        "the method `{0}` does not run on `adaptive` noise in this form; name a trained model, or choose iekf with plain `adaptive`"
+    )]
+    NotAdaptive(Method),
+}
+
+/// Settings of the training of a noise model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseModelSettings {
+    /// Name of the model; a name that exists gets a further version.
+    #[schema(pattern = "^[a-z][a-z0-9-]{0,63}$", max_length = 64, example = "ward-3")]
+    pub name: String,
+    /// What the model describes, for a person; at most 500 characters.
+    #[serde(default)]
+    #[schema(max_length = 500)]
+    pub description: String,
+    /// Recordings of a subject who stands still; at least two, with 20 seconds without movement in all.
+    #[schema(min_items = 2, max_items = 50)]
+    pub static_recordings: Vec<Uuid>,
+    /// Recordings of the movements that the model is for. Without any, the joints turn as in `nite-table1`.
+    #[serde(default)]
+    #[schema(max_items = 50)]
+    pub movement_recordings: Vec<Uuid>,
 }
 
 /// A method was asked to smooth that only goes forwards.

@@ -1,7 +1,8 @@
 //! `surefoot assess`: one recording, assessed on this machine without a service.
 
+use super::noise_model::NoiseModelChoice;
 use crate::assessment::{Assessment, JointAngleSettings, Method, Pass, Settings};
-use crate::pipeline;
+use crate::pipeline::{self, Inputs};
 use crate::progress::{Monitor, Step};
 use crate::recording::decode::{Limits, decode};
 use crate::recording::{Format, Recording};
@@ -19,7 +20,8 @@ use std::time::Duration;
 /// interval. The same file and settings always give the same numbers as an upload would.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot assess squat.mcap\n  surefoot assess squat.mcap --csv angles.csv\n  \
-    surefoot assess squat.json --method particle --particles 2048 --json")]
+    surefoot assess squat.json --method particle --particles 2048 --json\n  \
+    surefoot assess squat.mcap --noise-model kinect-v2")]
 pub struct Args {
     /// Recording, .mcap or .json; the content decides
     recording: PathBuf,
@@ -35,6 +37,10 @@ pub struct Args {
     /// Seed of the random streams
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Noise of the sensor: adaptive (estimated from the recording itself), nite-table1, kinect-v1, kinect-v2, or the file
+    /// of a model that `surefoot train` wrote; the method's own choice when absent
+    #[arg(long, value_name = "NAME|FILE")]
+    noise_model: Option<NoiseModelChoice>,
     /// Write all series as CSV: time_s, then value, low, high and flags of each channel
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -55,9 +61,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         pass: args.pass,
         particles: args.particles,
         seed: args.seed,
+        noise_model: args.noise_model.as_ref().map(NoiseModelChoice::name),
         ..JointAngleSettings::default()
     });
-    let mut assessment = assess_with_progress(&recording, &settings)?;
+    let inputs = Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model) };
+    let mut assessment = assess_with_progress(&recording, &settings, &inputs)?;
     assessment.provenance.recording_sha256 = hex::encode(Sha256::digest(&bytes));
     if let Some(path) = &args.csv {
         write_csv(&assessment, path).with_context(|| format!("cannot write {}", path.display()))?;
@@ -76,7 +84,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn recording_of(bytes: &[u8]) -> anyhow::Result<Recording> {
+/// The recording that a file holds, whatever its format.
+///
+/// # Errors
+/// Code, place and sentence of the first defect.
+pub(super) fn recording_of(bytes: &[u8]) -> anyhow::Result<Recording> {
     let format = Format::sniff(bytes).ok_or_else(|| anyhow!("neither an MCAP file nor a JSON document"))?;
     decode(bytes, format, &Limits::default()).map_err(|error| match &error.place {
         Some(place) => anyhow!("{} at {place}: {error}", error.code),
@@ -85,13 +97,13 @@ fn recording_of(bytes: &[u8]) -> anyhow::Result<Recording> {
 }
 
 /// Runs the pipeline on a thread of its own while this one shows how far it is.
-fn assess_with_progress(recording: &Recording, settings: &Settings) -> anyhow::Result<Assessment> {
+fn assess_with_progress(recording: &Recording, settings: &Settings, inputs: &Inputs) -> anyhow::Result<Assessment> {
     let monitor = Monitor::default();
     let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
     bar.set_style(ProgressStyle::with_template("{msg:12} {bar:40} {pos}/{len}")?);
     std::thread::scope(|scope| {
         let viewer = monitor.clone();
-        let work = scope.spawn(|| pipeline::assess(recording, settings, &monitor));
+        let work = scope.spawn(|| pipeline::assess_with(recording, settings, inputs, &monitor));
         while !work.is_finished() {
             let progress = viewer.progress();
             bar.set_length(progress.total);

@@ -5,9 +5,11 @@ pub mod demo;
 pub mod evaluate;
 pub mod import;
 pub mod key;
+mod noise_model;
 pub mod openapi;
 pub mod serve;
 pub mod simulate;
+pub mod train;
 
 use clap::{Parser, Subcommand};
 
@@ -29,6 +31,7 @@ enum Command {
     Import(import::Args),
     Simulate(simulate::Args),
     Evaluate(evaluate::Args),
+    Train(train::Args),
     Key(key::Args),
     Openapi(openapi::Args),
 }
@@ -46,6 +49,7 @@ pub fn run() -> anyhow::Result<()> {
         Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Train(args) => train::run(&args),
         Command::Key(args) => runtime.block_on(key::run(&args)),
         Command::Openapi(args) => openapi::run(&args),
     }

@@ -2,7 +2,7 @@
 
 pub mod joint_angles;
 
-use crate::assessment::{Assessment, Settings};
+use crate::assessment::{Assessment, NoiseModel, Settings};
 use crate::progress::{Cancelled, Monitor};
 use crate::recording::Recording;
 
@@ -37,13 +37,38 @@ impl From<Cancelled> for PipelineError {
     }
 }
 
-/// Runs the pipeline that the settings name. The recording's digest is added to the provenance by the caller.
+/// What a pipeline needs beside the recording and that settings only name.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Inputs {
+    /// The noise model that the settings name. Shipped models need not be given.
+    pub noise_model: Option<NoiseModel>,
+}
+
+/// Runs the pipeline that the settings name, on what comes with the software. The recording's digest is added to the
+/// provenance by the caller.
 ///
 /// # Errors
-/// [`PipelineError::Unsuitable`] says what the recording lacks; [`PipelineError::Cancelled`] when the monitor was
-/// asked to stop.
+/// See [`assess_with`].
 pub fn assess(recording: &Recording, settings: &Settings, monitor: &Monitor) -> Result<Assessment, PipelineError> {
+    assess_with(recording, settings, &Inputs::default(), monitor)
+}
+
+/// Runs the pipeline that the settings name, with what they refer to beside them.
+///
+/// # Errors
+/// [`PipelineError::Unsuitable`] says what the recording lacks, or which input is missing;
+/// [`PipelineError::Cancelled`] when the monitor was asked to stop.
+pub fn assess_with(
+    recording: &Recording,
+    settings: &Settings,
+    inputs: &Inputs,
+    monitor: &Monitor,
+) -> Result<Assessment, PipelineError> {
     match settings {
-        Settings::JointAngles(settings) => joint_angles::assess(recording, settings, monitor),
+        Settings::JointAngles(settings) => joint_angles::assess_with(recording, settings, inputs, monitor),
+        Settings::NoiseModel(_) => Err(PipelineError::unsuitable(
+            "not_an_assessment",
+            "a noise model is trained from several recordings; one recording alone is assessed by joint_angles",
+        )),
     }
 }

@@ -49,7 +49,7 @@ impl Queue {
             return Ok(None);
         };
         let row = sqlx::query(
-            "SELECT j.*, r.session_id, NULL AS assessment_id
+            "SELECT j.*, r.session_id, NULL AS assessment_id, NULL AS noise_model_id
              FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = ?1",
         )
         .bind(id)

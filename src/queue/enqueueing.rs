@@ -121,7 +121,7 @@ impl Queue {
             return Err(StorageError::not_found("recording"));
         }
         let row = sqlx::query(
-            "SELECT j.*, r.session_id, NULL AS assessment_id
+            "SELECT j.*, r.session_id, NULL AS assessment_id, NULL AS noise_model_id
              FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = ?1",
         )
         .bind(id)

@@ -1,11 +1,12 @@
 //! The end of an attempt: a result, a failure, a cancellation.
 
 use super::{JobError, JobState, Queue};
-use crate::assessment::Assessment;
+use crate::assessment::{Assessment, NoiseModel};
 use crate::storage::assessments::{self, EncodedAssessment};
 use crate::storage::clock::ms_from_time;
-use crate::storage::{Access, AssessmentId, JobId, RecordingId, StorageError, row};
-use sqlx::Row;
+use crate::storage::{Access, AssessmentId, JobId, NoiseModelId, RecordingId, StorageError, noise_models, row};
+use sqlx::{Row, SqliteConnection};
+use time::OffsetDateTime;
 use tokio::task::spawn_blocking;
 
 /// What became of a result.
@@ -13,6 +14,15 @@ use tokio::task::spawn_blocking;
 pub enum Finish {
     /// It is stored, and its job is done.
     Saved(AssessmentId),
+    /// The job was no longer the worker's; nothing was written.
+    Lost,
+}
+
+/// What became of a trained noise model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trained {
+    /// It is stored, and its job is done.
+    Saved(NoiseModelId),
     /// The job was no longer the worker's; nothing was written.
     Lost,
 }
@@ -42,21 +52,29 @@ impl Queue {
             .map_err(|panic| StorageError::Corrupt(format!("coding an assessment failed: {panic}")))??;
         let now = self.store.now();
         let mut transaction = self.store.begin().await?;
-        let recording: Option<RecordingId> = sqlx::query_scalar(
-            "UPDATE jobs SET state = 'done', due_at = NULL, finished_at = ?3, error = NULL, progress_step = 'saving',
-                             progress_done = 1, progress_total = 1
-             WHERE id = ?1 AND attempt = ?2 AND state = 'running' RETURNING recording_id",
-        )
-        .bind(id)
-        .bind(attempt)
-        .bind(ms_from_time(now))
-        .fetch_optional(&mut *transaction)
-        .await?;
+        let recording = end_as_done(&mut transaction, id, attempt, now).await?;
         let Some(recording) = recording else { return Ok(Finish::Lost) };
         let assessment = assessments::insert(&mut transaction, recording, id, &encoded, now).await?;
         transaction.commit().await?;
         self.announce(id);
         Ok(Finish::Saved(assessment))
+    }
+
+    /// Stores the noise model that attempt `attempt` trained, as the next version of its name, and ends its job, both or
+    /// neither.
+    ///
+    /// # Errors
+    /// When the database fails; the job runs on then.
+    pub async fn finish_training(&self, id: JobId, attempt: u32, model: NoiseModel) -> Result<Trained, StorageError> {
+        let now = self.store.now();
+        let mut transaction = self.store.begin().await?;
+        if end_as_done(&mut transaction, id, attempt, now).await?.is_none() {
+            return Ok(Trained::Lost);
+        }
+        let model = noise_models::insert(&mut transaction, id, model, now).await?;
+        transaction.commit().await?;
+        self.announce(id);
+        Ok(Trained::Saved(model))
     }
 
     /// Ends attempt `attempt` without a result. A `retryable` failure is tried again after a pause, until the job has
@@ -151,4 +169,25 @@ impl Queue {
         self.announce(id);
         self.job(access, id).await
     }
+}
+
+/// Ends an attempt with its result, which the caller writes in the same transaction; the job's recording, or `None` when
+/// the job was no longer the worker's.
+async fn end_as_done(
+    connection: &mut SqliteConnection,
+    id: JobId,
+    attempt: u32,
+    now: OffsetDateTime,
+) -> Result<Option<RecordingId>, StorageError> {
+    let recording = sqlx::query_scalar(
+        "UPDATE jobs SET state = 'done', due_at = NULL, finished_at = ?3, error = NULL, progress_step = 'saving',
+                         progress_done = 1, progress_total = 1
+         WHERE id = ?1 AND attempt = ?2 AND state = 'running' RETURNING recording_id",
+    )
+    .bind(id)
+    .bind(attempt)
+    .bind(ms_from_time(now))
+    .fetch_optional(connection)
+    .await?;
+    Ok(recording)
 }

@@ -1,8 +1,8 @@
-//! Jobs: the work on one recording, as the queue sees it.
+//! Jobs: the work on one recording, or on several that make a noise model, as the queue sees it.
 
 use crate::assessment::Settings;
 use crate::progress::{Progress, Step};
-use crate::storage::{AssessmentId, JobId, RecordingId, SessionId, StorageError, row};
+use crate::storage::{AssessmentId, JobId, NoiseModelId, RecordingId, SessionId, StorageError, row};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -17,7 +17,7 @@ pub enum JobState {
     Queued,
     /// A worker holds it.
     Running,
-    /// Its assessment is stored.
+    /// Its result is stored.
     Done,
     /// Given up; its error says why.
     Failed,
@@ -71,7 +71,7 @@ impl JobError {
 pub struct Job {
     /// Identity.
     pub id: JobId,
-    /// The recording to assess.
+    /// The recording to assess; of a training the first static one.
     pub recording_id: RecordingId,
     /// The recording's session.
     pub session_id: SessionId,
@@ -93,8 +93,10 @@ pub struct Job {
     pub settings: Settings,
     /// Why the latest attempt failed.
     pub error: Option<JobError>,
-    /// The result, once it is done.
+    /// The assessment, once one is done.
     pub assessment_id: Option<AssessmentId>,
+    /// The noise model, once a training is done.
+    pub noise_model_id: Option<NoiseModelId>,
     /// When it was asked for.
     pub queued_at: OffsetDateTime,
     /// When its latest attempt began.
@@ -112,7 +114,7 @@ pub struct JobFilter {
     pub recording_id: Option<RecordingId>,
 }
 
-/// A row of `jobs` with `session_id` and `assessment_id` beside it.
+/// A row of `jobs` with `session_id`, `assessment_id` and `noise_model_id` beside it.
 pub(super) fn job_from_row(row: &SqliteRow) -> Result<Job, StorageError> {
     let step: Step = row::word(row, "progress_step")?;
     Ok(Job {
@@ -129,6 +131,7 @@ pub(super) fn job_from_row(row: &SqliteRow) -> Result<Job, StorageError> {
         settings: row::json(row, "settings")?,
         error: row::optional_json(row, "error")?,
         assessment_id: row.try_get("assessment_id")?,
+        noise_model_id: row.try_get("noise_model_id")?,
         queued_at: row::time(row, "queued_at")?,
         started_at: row::optional_time(row, "started_at")?,
         finished_at: row::optional_time(row, "finished_at")?,

@@ -25,7 +25,7 @@ mod questions;
 
 pub use claiming::Renewal;
 pub use enqueueing::Submission;
-pub use finishing::{Failure, Finish};
+pub use finishing::{Failure, Finish, Trained};
 pub use job::{Job, JobError, JobFilter, JobState};
 
 use crate::config::Config;

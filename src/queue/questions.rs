@@ -11,9 +11,9 @@ impl Queue {
     /// `NotFound` when there is none.
     pub async fn job(&self, access: &Access, id: JobId) -> Result<Job, StorageError> {
         let row = sqlx::query(
-            "SELECT j.*, r.session_id, a.id AS assessment_id
+            "SELECT j.*, r.session_id, a.id AS assessment_id, n.id AS noise_model_id
              FROM jobs j JOIN recordings r ON r.id = j.recording_id JOIN sessions s ON s.id = r.session_id
-                  LEFT JOIN assessments a ON a.job_id = j.id
+                  LEFT JOIN assessments a ON a.job_id = j.id LEFT JOIN noise_models n ON n.job_id = j.id
              WHERE j.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND j.id = ?3",
         )
         .bind(access.organisation)
@@ -39,9 +39,9 @@ impl Queue {
         macro_rules! jobs_where {
             ($recording:literal) => {
                 concat!(
-                    "SELECT j.*, r.session_id, a.id AS assessment_id
+                    "SELECT j.*, r.session_id, a.id AS assessment_id, n.id AS noise_model_id
                      FROM jobs j JOIN recordings r ON r.id = j.recording_id JOIN sessions s ON s.id = r.session_id
-                          LEFT JOIN assessments a ON a.job_id = j.id
+                          LEFT JOIN assessments a ON a.job_id = j.id LEFT JOIN noise_models n ON n.job_id = j.id
                      WHERE j.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
                        AND j.id < ?3
                        AND (?4 IS NULL OR j.state = ?4)

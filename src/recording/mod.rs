@@ -51,7 +51,7 @@ pub struct Header {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Device {
-    /// Model, for example `kinect-v2`; chooses the noise model when the settings name none.
+    /// Model, for example `kinect-v2`. A description only: the noise model is chosen by the settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
     /// Body-tracking software and version.

@@ -63,6 +63,8 @@ ids! {
     JobId;
     /// Identity of an assessment: one pipeline's result on one recording.
     AssessmentId;
+    /// Identity of a noise model: one version of one name.
+    NoiseModelId;
 }
 
 #[cfg(test)]

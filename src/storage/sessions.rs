@@ -17,6 +17,8 @@ pub struct NewSession {
     pub protocol: Option<String>,
     /// Remarks of whoever made it.
     pub notes: Option<String>,
+    /// Noise model of the sensor, as settings name it.
+    pub noise_model: Option<String>,
 }
 
 /// A session.
@@ -34,6 +36,8 @@ pub struct Session {
     pub protocol: Option<String>,
     /// Remarks of whoever made it.
     pub notes: Option<String>,
+    /// Noise model of the sensor, as settings name it.
+    pub noise_model: Option<String>,
     /// When the row was made.
     pub created_at: OffsetDateTime,
 }
@@ -59,6 +63,7 @@ fn session_from_row(row: &SqliteRow) -> Result<Session, StorageError> {
         started_at: row::time(row, "started_at")?,
         protocol: row.try_get("protocol")?,
         notes: row.try_get("notes")?,
+        noise_model: row.try_get("noise_model")?,
         created_at: row::time(row, "created_at")?,
     })
 }
@@ -71,8 +76,9 @@ impl Store {
     pub async fn create_session(&self, access: &Access, new: &NewSession) -> Result<Session, StorageError> {
         let mut transaction = self.begin().await?;
         let row = sqlx::query(
-            "INSERT INTO sessions (id, organisation_id, patient_id, created_by, started_at, protocol, notes, created_at)
-             SELECT ?1, p.organisation_id, p.id, ?4, ?5, ?6, ?7, ?8 FROM patients p
+            "INSERT INTO sessions (id, organisation_id, patient_id, created_by, started_at, protocol, notes, noise_model,
+                                   created_at)
+             SELECT ?1, p.organisation_id, p.id, ?4, ?5, ?6, ?7, ?8, ?9 FROM patients p
              WHERE p.organisation_id = ?2 AND p.id = ?3 RETURNING *",
         )
         .bind(SessionId::new())
@@ -82,6 +88,7 @@ impl Store {
         .bind(ms_from_time(new.started_at))
         .bind(&new.protocol)
         .bind(&new.notes)
+        .bind(&new.noise_model)
         .bind(ms_from_time(self.now()))
         .fetch_optional(&mut *transaction)
         .await?

@@ -55,7 +55,7 @@ fn new_patient(pseudonym: &str) -> NewPatient {
 
 fn new_session(patient_id: PatientId) -> NewSession {
     let started_at = datetime!(2026-11-22 07:00:00.123 UTC);
-    NewSession { patient_id, started_at, protocol: Some("sit_front_knee".into()), notes: None }
+    NewSession { patient_id, started_at, protocol: Some("sit_front_knee".into()), notes: None, noise_model: None }
 }
 
 async fn new_recording(store: &Store, session_id: SessionId) -> NewRecording {

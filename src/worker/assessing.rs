@@ -1,12 +1,13 @@
-//! One attempt: stored bytes to an assessment.
+//! One attempt: stored bytes to an assessment, or to a noise model.
 
-use crate::assessment::{Assessment, Settings};
-use crate::pipeline::{self, PipelineError};
+use crate::assessment::{Assessment, NoiseModel, NoiseModelSettings, Settings};
+use crate::pipeline::joint_angles::training::{RecordingIdentity, Trainer};
+use crate::pipeline::{self, Inputs, PipelineError};
 use crate::progress::{Cancelled, Monitor, Step};
 use crate::queue::JobError;
-use crate::recording::DecodeError;
 use crate::recording::decode::{Limits, decode};
-use crate::storage::{StorageError, StoredRecording};
+use crate::recording::{DecodeError, Recording};
+use crate::storage::{BlobReader, StorageError, StoredRecording};
 use std::io::{self, Read};
 
 /// Why an attempt has no assessment.
@@ -82,14 +83,59 @@ pub fn assess_recording(
     reader: impl Read,
     recording: &StoredRecording,
     settings: &Settings,
+    inputs: &Inputs,
     limits: &Limits,
     monitor: &Monitor,
 ) -> Result<Assessment, AttemptError> {
+    let decoded = decode_stored(reader, recording, limits, monitor)?;
+    Ok(pipeline::assess_with(&decoded, settings, inputs, monitor)?)
+}
+
+/// Stored recordings that a noise model is trained on, opened.
+#[derive(Debug, Default)]
+pub(super) struct TrainingRecordings {
+    pub(super) still: Vec<(BlobReader, StoredRecording)>,
+    pub(super) movement: Vec<(BlobReader, StoredRecording)>,
+}
+
+/// Decodes stored recordings, one after the other, and trains a noise model.
+///
+/// # Errors
+/// See [`AttemptError`].
+pub(super) fn train_noise_model(
+    recordings: TrainingRecordings,
+    settings: &NoiseModelSettings,
+    limits: &Limits,
+    monitor: &Monitor,
+) -> Result<NoiseModel, AttemptError> {
+    let identity = |stored: &StoredRecording| RecordingIdentity {
+        name: stored.id.to_string(),
+        sha256: stored.blob.sha256.clone(),
+    };
+    let mut trainer = Trainer::default();
+    for (reader, stored) in recordings.still {
+        let decoded = decode_stored(reader, &stored, limits, monitor)?;
+        trainer.add_static(identity(&stored), &decoded, monitor)?;
+    }
+    for (reader, stored) in recordings.movement {
+        let decoded = decode_stored(reader, &stored, limits, monitor)?;
+        trainer.add_movement(identity(&stored), &decoded, monitor)?;
+    }
+    monitor.begin(Step::Summarizing, 0)?;
+    Ok(trainer.finish(&settings.name, &settings.description)?)
+}
+
+fn decode_stored(
+    reader: impl Read,
+    recording: &StoredRecording,
+    limits: &Limits,
+    monitor: &Monitor,
+) -> Result<Recording, AttemptError> {
     monitor.begin(Step::Decoding, recording.blob.size_bytes)?;
     let decoded = decode(Watched { reader, monitor }, recording.inspection.format, limits);
     // A reader that was stopped looks like one that failed.
     monitor.check()?;
-    Ok(pipeline::assess(&decoded?, settings, monitor)?)
+    Ok(decoded?)
 }
 
 /// A reader that reports its progress and stops on request.

@@ -1,4 +1,4 @@
-//! The worker: claim a job, load its recording, assess, save.
+//! The worker: claim a job, load its recording, assess, save; or load several, train a noise model, save.
 //!
 //! The computation runs on a blocking thread, so a panic in it is a failed job and not a lost worker. Meanwhile the
 //! async side renews the lease, writes the progress, and passes on the request to stop: from a client, from the
@@ -8,11 +8,15 @@ mod assessing;
 
 pub use assessing::{AttemptError, assess_recording};
 
-use crate::assessment::{Assessment, Settings};
+use assessing::{TrainingRecordings, train_noise_model};
+
+use crate::assessment::noise_model::find_shipped;
+use crate::assessment::{Assessment, JointAngleSettings, NoiseModel, NoiseModelSettings, Settings};
+use crate::pipeline::{Inputs, PipelineError};
 use crate::progress::{Monitor, Step};
-use crate::queue::{Failure, Finish, Job, JobError, Queue, Renewal};
+use crate::queue::{Failure, Finish, Job, JobError, Queue, Renewal, Trained};
 use crate::recording::decode::Limits;
-use crate::storage::{BlobReader, JobId, StorageError, StoredRecording};
+use crate::storage::{BlobReader, JobId, RecordingId, StorageError, StoredRecording};
 use std::fmt;
 use std::pin::pin;
 use std::sync::Arc;
@@ -30,9 +34,16 @@ const POLL: Duration = Duration::from_secs(1);
 /// Metric: time from the request for a job to the beginning of an attempt, seconds.
 const JOB_WAIT: &str = "surefoot_job_wait_seconds";
 
-/// The computation of one attempt, on a blocking thread.
-pub type Assess =
-    dyn Fn(BlobReader, &StoredRecording, &Settings, &Monitor) -> Result<Assessment, AttemptError> + Send + Sync;
+/// The computation of one assessment, on a blocking thread.
+pub type Assess = dyn Fn(BlobReader, &StoredRecording, &Settings, &Inputs, &Monitor) -> Result<Assessment, AttemptError>
+    + Send
+    + Sync;
+
+/// What an attempt came to.
+enum Outcome {
+    Assessment(Box<Assessment>),
+    NoiseModel(Box<NoiseModel>),
+}
 
 /// What one look at the queue came to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +60,7 @@ pub struct Worker {
     queue: Queue,
     name: String,
     assess: Arc<Assess>,
+    limits: Limits,
     heartbeat: Duration,
     shutdown: CancellationToken,
 }
@@ -74,11 +86,17 @@ impl Worker {
     /// A worker that decodes recordings and runs the pipelines.
     pub fn new(queue: Queue, name: impl Into<String>, limits: Limits, shutdown: CancellationToken) -> Self {
         let heartbeat = HEARTBEAT.min(queue.settings().lease.unsigned_abs() / 4);
-        let assess =
-            Arc::new(move |reader: BlobReader, recording: &StoredRecording, settings: &Settings, monitor: &Monitor| {
-                assess_recording(reader, recording, settings, &limits, monitor)
-            });
-        Self { queue, name: name.into(), assess, heartbeat, shutdown }
+        let for_assessments = limits.clone();
+        let assess = Arc::new(
+            move |reader: BlobReader,
+                  recording: &StoredRecording,
+                  settings: &Settings,
+                  inputs: &Inputs,
+                  monitor: &Monitor| {
+                assess_recording(reader, recording, settings, inputs, &for_assessments, monitor)
+            },
+        );
+        Self { queue, name: name.into(), assess, limits, heartbeat, shutdown }
     }
 
     /// The same worker with another computation.
@@ -125,30 +143,82 @@ impl Worker {
         }
         let monitor = Monitor::default();
         match self.attempt(&job, &monitor).await {
-            Ok(assessment) => self.save(&job, assessment, &monitor).await?,
+            Ok(outcome) => self.save(&job, outcome, &monitor).await?,
             Err(error) => self.give_up(&job, error).await?,
         }
         Ok(Ran::Job(job.id))
     }
 
-    async fn attempt(&self, job: &Job, monitor: &Monitor) -> Result<Assessment, AttemptError> {
-        let recording = self.queue.store().recording_to_assess(job.recording_id).await?;
-        let reader = self.queue.store().blobs().reader(&recording.blob).await?;
+    async fn attempt(&self, job: &Job, monitor: &Monitor) -> Result<Outcome, AttemptError> {
+        match &job.settings {
+            Settings::JointAngles(settings) => {
+                let inputs = self.inputs(job, settings).await?;
+                let assessment = self.assessment(job, inputs, monitor).await?;
+                Ok(Outcome::Assessment(Box::new(assessment)))
+            }
+            Settings::NoiseModel(settings) => {
+                let model = self.noise_model(job, settings, monitor).await?;
+                Ok(Outcome::NoiseModel(Box::new(model)))
+            }
+        }
+    }
+
+    async fn assessment(&self, job: &Job, inputs: Inputs, monitor: &Monitor) -> Result<Assessment, AttemptError> {
+        let (reader, recording) = self.open(job.recording_id).await?;
         let (assess, settings, view) = (self.assess.clone(), job.settings.clone(), monitor.clone());
         let sha256 = recording.blob.sha256.clone();
-        let computing = spawn_blocking(move || assess(reader, &recording, &settings, &view));
+        let computing = spawn_blocking(move || assess(reader, &recording, &settings, &inputs, &view));
         let mut assessment = self.watch(job, monitor, computing).await?;
         assessment.provenance.recording_sha256 = sha256;
         Ok(assessment)
     }
 
+    async fn noise_model(
+        &self,
+        job: &Job,
+        settings: &NoiseModelSettings,
+        monitor: &Monitor,
+    ) -> Result<NoiseModel, AttemptError> {
+        let mut recordings = TrainingRecordings::default();
+        for id in &settings.static_recordings {
+            recordings.still.push(self.open(RecordingId(*id)).await?);
+        }
+        for id in &settings.movement_recordings {
+            recordings.movement.push(self.open(RecordingId(*id)).await?);
+        }
+        let (settings, limits, view) = (settings.clone(), self.limits.clone(), monitor.clone());
+        let computing = spawn_blocking(move || train_noise_model(recordings, &settings, &limits, &view));
+        self.watch(job, monitor, computing).await
+    }
+
+    async fn open(&self, id: RecordingId) -> Result<(BlobReader, StoredRecording), AttemptError> {
+        let recording = self.queue.store().recording_to_assess(id).await?;
+        let reader = self.queue.store().blobs().reader(&recording.blob).await?;
+        Ok((reader, recording))
+    }
+
+    /// The noise model that the settings name, when it does not come with the software.
+    async fn inputs(&self, job: &Job, settings: &JointAngleSettings) -> Result<Inputs, AttemptError> {
+        let unusable = |error: &dyn fmt::Display| PipelineError::unsuitable("unusable_noise_model", error.to_string());
+        let name = settings.chosen_noise_model().map_err(|error| unusable(&error))?;
+        let Some(name) = name.filter(|name| !name.is_adaptive() && find_shipped(name).is_none()) else {
+            return Ok(Inputs::default());
+        };
+        match self.queue.store().noise_model_of_job(job.id, &name).await {
+            Ok(model) => Ok(Inputs { noise_model: Some(model) }),
+            // The pipeline says which model is missing.
+            Err(StorageError::NotFound { .. }) => Ok(Inputs::default()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
     /// Waits for the computation, renews the lease, and passes on the request to stop.
-    async fn watch(
+    async fn watch<T>(
         &self,
         job: &Job,
         monitor: &Monitor,
-        mut computing: JoinHandle<Result<Assessment, AttemptError>>,
-    ) -> Result<Assessment, AttemptError> {
+        mut computing: JoinHandle<Result<T, AttemptError>>,
+    ) -> Result<T, AttemptError> {
         let mut heartbeat = tokio::time::interval(self.heartbeat);
         heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
         heartbeat.reset();
@@ -169,15 +239,27 @@ impl Worker {
         }
     }
 
-    async fn save(&self, job: &Job, assessment: Assessment, monitor: &Monitor) -> Result<(), StorageError> {
+    async fn save(&self, job: &Job, outcome: Outcome, monitor: &Monitor) -> Result<(), StorageError> {
         // A request to stop that comes now is too late: the result is there.
         let _ = monitor.begin(Step::Saving, 1);
-        match self.queue.finish(job.id, job.attempt, assessment).await {
-            Ok(Finish::Saved(assessment)) => {
-                tracing::info!(job = %job.id, attempt = job.attempt, %assessment, "job done");
+        let saved = match outcome {
+            Outcome::Assessment(assessment) => match self.queue.finish(job.id, job.attempt, *assessment).await {
+                Ok(Finish::Saved(assessment)) => Ok(Some(assessment.0)),
+                Ok(Finish::Lost) => Ok(None),
+                Err(error) => Err(error),
+            },
+            Outcome::NoiseModel(model) => match self.queue.finish_training(job.id, job.attempt, *model).await {
+                Ok(Trained::Saved(model)) => Ok(Some(model.0)),
+                Ok(Trained::Lost) => Ok(None),
+                Err(error) => Err(error),
+            },
+        };
+        match saved {
+            Ok(Some(result)) => {
+                tracing::info!(job = %job.id, attempt = job.attempt, %result, "job done");
                 Ok(())
             }
-            Ok(Finish::Lost) => {
+            Ok(None) => {
                 tracing::warn!(job = %job.id, attempt = job.attempt, "a result came after its lease, and was left");
                 Ok(())
             }

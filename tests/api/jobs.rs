@@ -25,7 +25,7 @@ async fn a_finished_job_names_its_assessment() {
 
 #[tokio::test]
 async fn a_recording_that_cannot_be_assessed_is_a_failed_job_with_code_place_and_sentence() {
-    let refuse = Arc::new(|_, _: &_, _: &_, _: &_| {
+    let refuse = Arc::new(|_, _: &_, _: &_, _: &_, _: &_| {
         let sentence = "the left and the right side change places".to_owned();
         let place = Some("frames[17]".to_owned());
         Err(AttemptError::Refused(JobError { code: "handedness_mismatch".into(), place, sentence }))

@@ -8,6 +8,7 @@ mod clients;
 mod events;
 mod health;
 mod jobs;
+mod noise_models;
 mod patients;
 mod problems;
 mod recordings;

@@ -17,6 +17,7 @@ async fn a_session_is_made_and_found_again() {
       "created_at": "[time]",
       "created_by": "[id]",
       "id": "[id]",
+      "noise_model": null,
       "notes": "slept badly",
       "patient_id": "[id]",
       "protocol": "sit_to_stand",

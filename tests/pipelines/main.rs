@@ -2,6 +2,7 @@
 
 mod events;
 mod support;
+mod training;
 
 use support::{centimetres, exercise, mean_absolute_error, mirrored, series, without};
 use surefoot::assessment::series::FLAG_BRIDGED;

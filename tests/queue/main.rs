@@ -5,4 +5,5 @@
 mod access;
 mod claiming;
 mod support;
+mod training;
 mod working;

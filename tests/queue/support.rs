@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use surefoot::assessment::{Assessment, Provenance, Quality, Series, Settings};
+use surefoot::pipeline::Inputs;
 use surefoot::progress::Monitor;
 use surefoot::queue::{Job, Queue, QueueSettings};
 use surefoot::recording::Header;
@@ -48,6 +49,7 @@ impl Bench {
             started_at: datetime!(2026-11-22 07:00 UTC),
             protocol: None,
             notes: None,
+            noise_model: None,
         };
         let session = store.create_session(&access, &session).await.unwrap().id;
         Self { dir, clock, queue, access, session }
@@ -156,7 +158,7 @@ pub fn endless(begun: &Arc<AtomicBool>) -> Arc<Assess> {
 pub fn computation(
     compute: impl Fn(BlobReader, &StoredRecording, &Monitor) -> Result<Assessment, AttemptError> + Send + Sync + 'static,
 ) -> Arc<Assess> {
-    Arc::new(move |reader: BlobReader, recording: &StoredRecording, _: &Settings, monitor: &Monitor| {
+    Arc::new(move |reader: BlobReader, recording: &StoredRecording, _: &Settings, _: &Inputs, monitor: &Monitor| {
         compute(reader, recording, monitor)
     })
 }

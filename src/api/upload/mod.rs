@@ -9,11 +9,12 @@ mod arrival;
 use super::auth::Caller;
 use super::error::ApiError;
 use super::jobs::JobResponse;
+use super::noise_models::pinned;
 use super::recordings::RecordingResponse;
 use super::request::ApiPath;
 use super::sessions::SessionPath;
 use super::state::AppState;
-use crate::assessment::Settings;
+use crate::assessment::{JointAngleSettings, Settings};
 use crate::queue::{Job, Submission};
 use crate::storage::{NewRecording, SessionId, StoredRecording, StoredResponse};
 use announced::Announced;
@@ -79,7 +80,8 @@ async fn upload_recording(
     announced.check_digest(arrived.sealed.sha256())?;
 
     let fingerprint = fingerprint(session.id, &arrived);
-    let settings = Settings::default();
+    let settings = JointAngleSettings { noise_model: session.noise_model.clone(), ..JointAngleSettings::default() };
+    let settings = Settings::JointAngles(pinned(&state, &caller.access, settings).await?);
     let blob = arrived.sealed.keep().await?;
     let new = NewRecording { session_id: session.id, blob, inspection: arrived.inspection };
     let Some(key) = &announced.idempotency_key else {

@@ -7,10 +7,12 @@ mod table;
 mod verdict_table;
 mod watch;
 
+use super::noise_model::NoiseModelChoice;
 use crate::assessment::JointAngleSettings;
 use crate::evaluation::contender::{PAPER_PARTICLES, PARTICLES};
 use crate::evaluation::joint_angles::run as run_contenders;
 use crate::evaluation::{Contender, Evaluation, TrialSource, figures};
+use crate::pipeline::Inputs;
 use crate::synthetic::Preset;
 use anyhow::{Context, bail};
 use clap::Subcommand;
@@ -79,6 +81,10 @@ struct JointAngleArgs {
     /// Seed of the methods' random streams
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Noise of the sensor for methods that take any: adaptive, nite-table1, kinect-v1, kinect-v2, or the file of a
+    /// trained model; each method's own choice when absent
+    #[arg(long, value_name = "NAME|FILE")]
+    noise_model: Option<NoiseModelChoice>,
     /// Print the paper's Table 2: rotation errors of hips and knees, and the gain over the middleware
     #[arg(long)]
     table2: bool,
@@ -111,13 +117,15 @@ struct Plan {
     seeds: u64,
     contenders: Vec<Contender>,
     settings: JointAngleSettings,
+    /// The noise model that the settings name.
+    inputs: Inputs,
 }
 
 fn joint_angles(args: &JointAngleArgs, out: &mut dyn Write) -> anyhow::Result<()> {
     let plan = plan(args)?;
     let sources = sources_of(&plan)?;
     let watch = Watch::new(sources.len() as u64);
-    let outcomes = run_contenders(&sources, &plan.contenders, &plan.settings, || watch.one_more());
+    let outcomes = run_contenders(&sources, &plan.contenders, &plan.settings, &plan.inputs, || watch.one_more());
     watch.finish();
     let evaluation = outcomes.summarize();
     report_gaps(&evaluation);
@@ -157,7 +165,11 @@ fn plan(args: &JointAngleArgs) -> anyhow::Result<Plan> {
         ([], true) => &PAPER_PARTICLES[..],
         (given, _) => given,
     };
-    let mut settings = JointAngleSettings { seed: args.seed, ..JointAngleSettings::default() };
+    let mut settings = JointAngleSettings {
+        seed: args.seed,
+        noise_model: args.noise_model.as_ref().map(NoiseModelChoice::name),
+        ..JointAngleSettings::default()
+    };
     // One number is a setting of the run; several are contenders of their own.
     let counts = match particles {
         [one] if !args.table2 => {
@@ -183,6 +195,7 @@ fn plan(args: &JointAngleArgs) -> anyhow::Result<Plan> {
         seeds: args.seeds.unwrap_or(if args.table2 { 6 } else { 3 }),
         contenders,
         settings,
+        inputs: Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model) },
     })
 }
 

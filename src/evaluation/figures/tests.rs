@@ -2,6 +2,7 @@ use super::*;
 use crate::assessment::{JointAngleSettings, Method};
 use crate::evaluation::joint_angles::run;
 use crate::evaluation::{Trial, TrialSource};
+use crate::pipeline::Inputs;
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 
 fn outcomes() -> Outcomes {
@@ -15,7 +16,7 @@ fn outcomes() -> Outcomes {
     });
     let mut contenders = vec![Contender::Raw, Contender::default_method(), Contender::MIDDLEWARE];
     contenders.extend(Contender::of(Method::Particle).with_each(&[16, 64]));
-    run(&sources, &contenders, &JointAngleSettings::default(), || ())
+    run(&sources, &contenders, &JointAngleSettings::default(), &Inputs::default(), || ())
 }
 
 fn figures(outcomes: &Outcomes) -> Vec<Figure> {
@@ -100,7 +101,7 @@ fn without_the_middleware_or_the_default_the_figures_that_need_them_are_left_out
         Ok(Trial { dataset: "lab".into(), exercise: "step".into(), recording })
     });
     let contenders = [Contender::Raw, Contender::of(Method::Ik)];
-    let outcomes = run(&[source], &contenders, &JointAngleSettings::default(), || ());
+    let outcomes = run(&[source], &contenders, &JointAngleSettings::default(), &Inputs::default(), || ());
     let names: Vec<String> = figures(&outcomes).into_iter().map(|figure| figure.name).collect();
     assert_eq!(names, ["boxes-lab"]);
 }

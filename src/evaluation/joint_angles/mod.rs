@@ -10,7 +10,7 @@ use super::trial::TrialSource;
 use crate::assessment::series::{FLAG_BRIDGED, FLAG_NOT_OBSERVABLE};
 use crate::assessment::{AngleChannel, Assessment, JointAngleSettings, Settings};
 use crate::body::Side;
-use crate::pipeline;
+use crate::pipeline::{self, Inputs};
 use crate::progress::Monitor;
 use crate::recording::Recording;
 use rayon::prelude::*;
@@ -88,6 +88,7 @@ pub fn run(
     sources: &[TrialSource],
     contenders: &[Contender],
     settings: &JointAngleSettings,
+    inputs: &Inputs,
     done: impl Fn() + Sync,
 ) -> Outcomes {
     let trials = sources
@@ -95,7 +96,7 @@ pub fn run(
         // One at a time: trials differ in length, and a thread that is done takes the next.
         .with_max_len(1)
         .map(|source| {
-            let outcome = evaluate_trial(source, contenders, settings);
+            let outcome = evaluate_trial(source, contenders, settings, inputs);
             done();
             outcome
         })
@@ -108,9 +109,10 @@ pub fn evaluate(
     sources: &[TrialSource],
     contenders: &[Contender],
     settings: &JointAngleSettings,
+    inputs: &Inputs,
     done: impl Fn() + Sync,
 ) -> Evaluation {
-    run(sources, contenders, settings, done).summarize()
+    run(sources, contenders, settings, inputs, done).summarize()
 }
 
 /// What every contender did in one trial.
@@ -137,7 +139,12 @@ pub struct Compared {
     pub length_deviation_m: Option<f64>,
 }
 
-fn evaluate_trial(source: &TrialSource, contenders: &[Contender], settings: &JointAngleSettings) -> TrialOutcome {
+fn evaluate_trial(
+    source: &TrialSource,
+    contenders: &[Contender],
+    settings: &JointAngleSettings,
+    inputs: &Inputs,
+) -> TrialOutcome {
     let name = source.name.clone();
     let trial = match (source.load)() {
         Ok(trial) => trial,
@@ -148,23 +155,33 @@ fn evaluate_trial(source: &TrialSource, contenders: &[Contender], settings: &Joi
     };
     let measured = |channel: &str| MEASURES.iter().any(|(_, of)| Side::BOTH.iter().any(|s| of(*s).name() == channel));
     let has_reference = trial.recording.references.iter().any(|reference| measured(&reference.channel));
-    let compare = |contender: &Contender| compare(&trial.recording, *contender, settings);
+    let compare = |contender: &Contender| compare(&trial.recording, *contender, settings, inputs);
     let results = if has_reference { contenders.iter().map(compare).collect() } else { Vec::new() };
     let recorded_length_deviation_m = trial.recording.skeleton.as_ref().and_then(largest_deviation_recorded);
     TrialOutcome { name, place: Ok((trial.dataset, trial.exercise)), recorded_length_deviation_m, results }
 }
 
-/// Runs one contender on a recording and compares every measure that has a reference.
+/// Runs one contender on a recording and compares every measure that has a reference. A noise model in the settings is for
+/// the methods that take one; the others run without.
 ///
 /// # Errors
 /// The sentence with which the pipeline refused the recording.
-pub fn compare(recording: &Recording, contender: Contender, settings: &JointAngleSettings) -> Result<Compared, String> {
-    let Some(settings) = contender.settings(settings) else {
+pub fn compare(
+    recording: &Recording,
+    contender: Contender,
+    settings: &JointAngleSettings,
+    inputs: &Inputs,
+) -> Result<Compared, String> {
+    let Some(mut settings) = contender.settings(settings) else {
         let time_ns = recording.skeleton.as_ref().map_or(Vec::new(), |skeleton| skeleton.time_ns.clone());
         return Ok(Compared { time_ns, comparisons: compare_raw(recording), ..Compared::default() });
     };
+    if settings.method.default_noise_model().is_none() {
+        settings.noise_model = None;
+    }
     let settings = Settings::JointAngles(settings);
-    let assessment = pipeline::assess(recording, &settings, &Monitor::default()).map_err(|error| error.to_string())?;
+    let assessment =
+        pipeline::assess_with(recording, &settings, inputs, &Monitor::default()).map_err(|error| error.to_string())?;
     Ok(Compared {
         comparisons: compare_assessment(recording, &assessment),
         errors: frame_errors(recording, &assessment),

@@ -24,7 +24,7 @@ fn row<'a>(evaluation: &'a Evaluation, exercise: Exercise, method: &str, measure
 #[test]
 fn raw_joints_without_noise_agree_with_the_truth_exactly() {
     let sources = [trial(Exercise::BackKnee, Preset::Clean, 1), trial(Exercise::BackKnee, Preset::Clean, 2)];
-    let evaluation = evaluate(&sources, &[Contender::Raw], &settings(), || ());
+    let evaluation = evaluate(&sources, &[Contender::Raw], &settings(), &Inputs::default(), || ());
     assert_eq!(evaluation.failures, []);
     let knee = row(&evaluation, Exercise::BackKnee, "raw", "knee_flexion");
     assert_eq!((knee.n_trials, knee.n_frames, knee.coverage), (2, 2 * 2 * 301, 1.0));
@@ -37,7 +37,7 @@ fn raw_joints_without_noise_agree_with_the_truth_exactly() {
 fn there_is_a_line_for_both_sides_together_and_for_each() {
     let sources = [trial(Exercise::SideHip, Preset::Table1, 1)];
     let contenders = [Contender::Raw, Contender::of(Method::Ik)];
-    let evaluation = evaluate(&sources, &contenders, &settings(), || ());
+    let evaluation = evaluate(&sources, &contenders, &settings(), &Inputs::default(), || ());
     let measures = |method: &str| {
         let rows = evaluation.rows.iter().filter(|r| r.method == method);
         rows.map(|r| r.measure.as_str()).collect::<Vec<_>>()
@@ -60,7 +60,7 @@ fn a_trial_that_cannot_be_loaded_or_assessed_is_reported_and_the_others_count() 
         Ok(Trial { dataset: "simulated".into(), exercise: "step".into(), recording })
     });
     let sources = [broken, one_frame, trial(Exercise::Step, Preset::Clean, 2)];
-    let evaluation = evaluate(&sources, &[Contender::of(Method::Ik)], &settings(), || ());
+    let evaluation = evaluate(&sources, &[Contender::of(Method::Ik)], &settings(), &Inputs::default(), || ());
     let told: Vec<_> = evaluation.failures.iter().map(|f| (f.trial.as_str(), f.method.as_deref())).collect();
     assert_eq!(told, [("broken", None), ("one frame", Some("ik"))]);
     assert_eq!(evaluation.failures[0].reason, "the file is empty");
@@ -73,7 +73,7 @@ fn the_result_is_the_same_with_one_and_with_several_threads() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let sources = [1, 2, 3].map(|seed| trial(Exercise::Step, Preset::Failures, seed));
-        pool.install(|| evaluate(&sources, &Contender::all(), &settings(), || ()))
+        pool.install(|| evaluate(&sources, &Contender::all(), &settings(), &Inputs::default(), || ()))
     };
     let json = |evaluation: &Evaluation| serde_json::to_string(evaluation).unwrap();
     assert_eq!(json(&run(1)), json(&run(3)));
@@ -82,7 +82,7 @@ fn the_result_is_the_same_with_one_and_with_several_threads() {
 #[test]
 fn the_default_s_intervals_are_counted_against_the_truth() {
     let sources = [trial(Exercise::BackKnee, Preset::Table1, 1)];
-    let evaluation = evaluate(&sources, &[Contender::of(Method::Iekf)], &settings(), || ());
+    let evaluation = evaluate(&sources, &[Contender::of(Method::Iekf)], &settings(), &Inputs::default(), || ());
     let knee = row(&evaluation, Exercise::BackKnee, "iekf", "knee_flexion");
     let inside = knee.interval_coverage.expect("the default has intervals");
     assert!(inside > 0.5 && inside <= 1.0, "{inside}");
@@ -120,7 +120,7 @@ fn a_method_has_particles_exactly_when_its_assessment_tells_an_effective_sample_
 fn the_overview_takes_the_exercises_of_a_data_set_together() {
     let sources = [trial(Exercise::Step, Preset::Table1, 1), trial(Exercise::SideHip, Preset::Table1, 1)];
     let contenders = [Contender::default_method(), Contender::of(Method::Ik)];
-    let evaluation = evaluate(&sources, &contenders, &settings(), || ());
+    let evaluation = evaluate(&sources, &contenders, &settings(), &Inputs::default(), || ());
     assert_eq!(evaluation.overview.len(), contenders.len() * MEASURES.len());
     let knee = |method: &str| {
         let mut rows = evaluation.overview.iter();
@@ -140,11 +140,11 @@ fn the_overview_takes_the_exercises_of_a_data_set_together() {
 fn the_verdict_compares_the_default_with_every_other_in_each_exercise_and_in_all() {
     let sources = [trial(Exercise::Step, Preset::Table1, 1), trial(Exercise::SideHip, Preset::Table1, 1)];
     let contenders = [Contender::Raw, Contender::default_method(), Contender::of(Method::Ik)];
-    let verdict = evaluate(&sources, &contenders, &settings(), || ()).verdict.unwrap();
+    let verdict = evaluate(&sources, &contenders, &settings(), &Inputs::default(), || ()).verdict.unwrap();
     // Two exercises and all; raw in the knee only, `ik` in four angles; two statistics.
     assert_eq!(verdict.rows.len(), 3 * (1 + 4) * 2);
     let scored: usize = verdict.scores.iter().map(|score| score.beats + score.ties + score.loses).sum();
     assert_eq!(scored, 2 * (1 + 4) * 2, "rows of all exercises are not counted again");
     assert_eq!(verdict.default_beats_or_ties_everywhere, verdict.losses().count() == 0);
-    assert_eq!(evaluate(&sources, &contenders[..1], &settings(), || ()).verdict, None);
+    assert_eq!(evaluate(&sources, &contenders[..1], &settings(), &Inputs::default(), || ()).verdict, None);
 }

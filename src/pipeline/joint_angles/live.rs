@@ -58,7 +58,7 @@ impl LiveJointAngles {
     pub fn calibrated(recording: &SkeletonRecording, settings: &JointAngleSettings) -> Result<Self, PipelineError> {
         let mut observations = Observations::from_recording(recording, settings)?;
         let calibration = calibrate(&mut observations)?;
-        let model = StateSpace::new(&calibration.skeleton, &SensorNoise::of(&observations), &Tuning::default());
+        let model = StateSpace::new(&calibration.skeleton, &SensorNoise::adaptive(&observations), &Tuning::default());
         let initial = model.initial_pose(&observations);
         Ok(Self {
             tracker: Tracker::new(model, initial),

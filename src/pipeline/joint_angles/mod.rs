@@ -19,9 +19,13 @@ pub mod posterior;
 pub mod sensor_noise;
 pub mod series_builder;
 pub mod state_space;
+pub mod training;
 
-use super::PipelineError;
-use crate::assessment::{Assessment, JointAngleSettings, Method, Provenance, Quality, Series, Settings, Warning};
+use super::{Inputs, PipelineError};
+use crate::assessment::noise_model::find_shipped;
+use crate::assessment::{
+    Assessment, JointAngleSettings, Method, NoiseModelReference, Provenance, Quality, Series, Settings, Warning,
+};
 use crate::body::Pose;
 use crate::progress::{Monitor, Step};
 use crate::recording::Recording;
@@ -37,13 +41,27 @@ use state_space::{StateSpace, Tuning};
 /// Fewest frames of a recording that can be assessed.
 const MIN_FRAMES: usize = 2;
 
-/// Estimates the joint angles of every frame.
+/// Estimates the joint angles of every frame, on noise models that come with the software.
 ///
 /// # Errors
-/// [`PipelineError::Unsuitable`] with a code for each thing that a recording can lack; see the modules.
+/// See [`assess_with`].
 pub fn assess(
     recording: &Recording,
     settings: &JointAngleSettings,
+    monitor: &Monitor,
+) -> Result<Assessment, PipelineError> {
+    assess_with(recording, settings, &Inputs::default(), monitor)
+}
+
+/// Estimates the joint angles of every frame.
+///
+/// # Errors
+/// [`PipelineError::Unsuitable`] with a code for each thing that a recording can lack; see the modules. Also
+/// `noise_model_missing` when the settings name a noise model that is neither shipped nor among the inputs.
+pub fn assess_with(
+    recording: &Recording,
+    settings: &JointAngleSettings,
+    inputs: &Inputs,
     monitor: &Monitor,
 ) -> Result<Assessment, PipelineError> {
     let Some(skeleton) = recording.skeleton.as_ref().filter(|s| s.len() >= MIN_FRAMES) else {
@@ -54,6 +72,7 @@ pub fn assess(
     };
     let pass =
         settings.chosen_pass().map_err(|error| PipelineError::unsuitable("no_backward_pass", error.to_string()))?;
+    let noise = chosen_noise(settings, inputs)?;
     monitor.begin(Step::Calibrating, 0)?;
     let recorded = Observations::from_recording(skeleton, settings)?;
     let Inspection { repaired, repairs, events, counts } = inspect(skeleton, &recorded, settings)?;
@@ -67,13 +86,16 @@ pub fn assess(
     let emit = |posterior: &Posterior| builder.push(&posterior.summarize());
     match settings.method {
         Method::Particle => {
-            let noise = NoiseModel::nite_table1();
+            let model = noise.model().cloned().unwrap_or_else(NoiseModel::nite_table1);
             let sizes =
-                particle::run(&observations, &calibration, noise, settings.particles, settings.seed, monitor, emit)?;
+                particle::run(&observations, &calibration, model, settings.particles, settings.seed, monitor, emit)?;
             quality.effective_sample_size = Some(sizes);
         }
         Method::Iekf => {
-            let noise = SensorNoise::of(&observations);
+            let noise = match noise.model() {
+                Some(model) => SensorNoise::of_model(model, &observations),
+                None => SensorNoise::adaptive(&observations),
+            };
             let model = StateSpace::new(&calibration.skeleton, &noise, &Tuning::default());
             iekf::run(&observations, model, pass, monitor, |summary| builder.push(summary))?;
         }
@@ -99,9 +121,54 @@ pub fn assess(
             pipeline: "joint_angles".to_owned(),
             method: settings.method.name().to_owned(),
             settings: Settings::JointAngles(settings.clone()),
+            noise_model: noise.reference(),
             seed: settings.seed,
             recording_sha256: String::new(),
         },
+    })
+}
+
+/// The noise that a method runs on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ChosenNoise<'a> {
+    /// None: the method has no model of noise.
+    None,
+    /// Estimated from the recording itself.
+    Adaptive,
+    /// A named model.
+    Model(&'a NoiseModel),
+}
+
+impl<'a> ChosenNoise<'a> {
+    fn model(self) -> Option<&'a NoiseModel> {
+        if let Self::Model(model) = self { Some(model) } else { None }
+    }
+
+    fn reference(self) -> Option<NoiseModelReference> {
+        match self {
+            Self::None => None,
+            Self::Adaptive => Some(NoiseModelReference::adaptive()),
+            Self::Model(model) => Some(model.reference()),
+        }
+    }
+}
+
+/// Finds what the settings name, among the inputs and the shipped models.
+fn chosen_noise<'a>(settings: &JointAngleSettings, inputs: &'a Inputs) -> Result<ChosenNoise<'a>, PipelineError> {
+    let name = settings
+        .chosen_noise_model()
+        .map_err(|error| PipelineError::unsuitable("unusable_noise_model", error.to_string()))?;
+    let Some(name) = name else { return Ok(ChosenNoise::None) };
+    if name.is_adaptive() {
+        return Ok(ChosenNoise::Adaptive);
+    }
+    let given = inputs.noise_model.as_ref().filter(|model| {
+        let found = model.name();
+        found.name == name.name && (name.version.is_none() || name.version == found.version)
+    });
+    given.or_else(|| find_shipped(&name)).map(ChosenNoise::Model).ok_or_else(|| {
+        let sentence = format!("the noise model `{name}` is not there; name one that exists, or leave it out");
+        PipelineError::unsuitable("noise_model_missing", sentence)
     })
 }
 

@@ -1,75 +1,19 @@
 //! Noise of the state-space model: how far joints turn between frames and how far the sensor is off (\[angles\] Table 1).
 
-use crate::body::pose::{PoseVector, attitude_offset, hinge_offset};
-use crate::body::skeleton::point_index;
-use crate::body::{Limb, OBSERVATION_DIMENSION};
-use nalgebra::{Rotation3, SMatrix, Vector3};
+pub use crate::assessment::noise_model::{NoiseModel, ObservationCovariance};
 
-/// Covariance of the observation vector y, m².
-pub type ObservationCovariance = SMatrix<f64, OBSERVATION_DIMENSION, OBSERVATION_DIMENSION>;
+use crate::assessment::noise_model;
+use crate::body::OBSERVATION_DIMENSION;
+use crate::body::pose::PoseVector;
+use nalgebra::{Rotation3, Vector3};
 
 /// Rate at which the standard deviations of the transition are stated, Hz.
 pub const TRANSITION_RATE_HZ: f64 = 30.0;
 
-/// A named pair of covariances.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NoiseModel {
-    /// Name in provenance.
-    pub name: &'static str,
-    /// Standard deviation of each element of θ from one frame to the next at [`TRANSITION_RATE_HZ`], radians (Σθ is
-    /// diagonal).
-    pub transition_sd: PoseVector,
-    /// Covariance Σy of y in the sensor's axes (x and y in the image, z in depth), m².
-    pub observation: ObservationCovariance,
-}
-
-/// Table 1's columns x, y, z are lateral, vertical and sagittal: in `subject` Z, Y and X.
-const TRUNK_SD_DEG: [f64; 3] = [1.60, 2.44, 1.16];
-const SHOULDER_SD_DEG: [f64; 3] = [2.88, 5.64, 2.8];
-const ELBOW_SD_DEG: f64 = 2.44;
-const HIP_SD_DEG: [f64; 3] = [2.76, 3.28, 3.36];
-const KNEE_SD_DEG: f64 = 1.31;
-
-/// Table 1, positions relative to the torso joint, millimetres: arm then leg, proximal point first.
-const POSITION_SD_MM: [[[f64; 3]; 3]; 2] = [
-    [[9.1, 6.7, 12.7], [29.8, 25.2, 20.3], [151.5, 181.7, 14.5]],
-    [[6.0, 6.5, 10.1], [8.8, 16.8, 35.1], [19.8, 25.2, 38.1]],
-];
-
 impl NoiseModel {
     /// The paper's Table 1.
-    ///
-    /// The paper's correlations are not published. Those here have one source that is certain: every element of y
-    /// has the torso joint's own noise in it. The hip is the quietest point; taking the torso to be as noisy as the
-    /// hip, half of the hip's variance is common to all points.
     pub fn nite_table1() -> Self {
-        let mut transition_deg = PoseVector::zeros();
-        let mut set = |start: usize, [x, y, z]: [f64; 3]| {
-            transition_deg[start] = z;
-            transition_deg[start + 1] = y;
-            transition_deg[start + 2] = x;
-        };
-        set(0, TRUNK_SD_DEG);
-        for limb in Limb::ALL {
-            set(attitude_offset(limb.index()), if limb.is_arm() { SHOULDER_SD_DEG } else { HIP_SD_DEG });
-        }
-        for limb in Limb::ALL {
-            transition_deg[hinge_offset(limb.index())] = if limb.is_arm() { ELBOW_SD_DEG } else { KNEE_SD_DEG };
-        }
-        let hip = POSITION_SD_MM[1][0];
-        let mut observation = ObservationCovariance::zeros();
-        for limb in Limb::ALL {
-            for (level, sd) in POSITION_SD_MM[usize::from(!limb.is_arm())].iter().enumerate() {
-                for axis in 0..3 {
-                    let row = 3 * point_index(limb, level) + axis;
-                    for other in (axis..OBSERVATION_DIMENSION).step_by(3) {
-                        let variance = if other == row { sd[axis].powi(2) } else { 0.5 * hip[axis].powi(2) };
-                        observation[(row, other)] = variance * 1e-6;
-                    }
-                }
-            }
-        }
-        Self { name: "nite-table1", transition_sd: transition_deg.map(f64::to_radians), observation }
+        noise_model::nite_table1().clone()
     }
 
     /// Σy turned from the sensor's axes into another frame.
@@ -100,15 +44,9 @@ pub fn transition_sd_over(model: &NoiseModel, interval_s: f64) -> PoseVector {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn table_1_is_positive_definite_with_its_standard_deviations_on_the_diagonal() {
-        let model = NoiseModel::nite_table1();
-        assert!(model.observation.cholesky().is_some());
-        let hand = model.point_sd(point_index(Limb::LeftArm, 2));
-        assert!((hand - Vector3::new(0.1515, 0.1817, 0.0145)).norm() < 1e-12);
-        assert_eq!(model.observation, model.observation.transpose());
-    }
+    use crate::body::Limb;
+    use crate::body::pose::{attitude_offset, hinge_offset};
+    use crate::body::skeleton::point_index;
 
     #[test]
     fn turning_by_90_degrees_about_the_vertical_exchanges_image_and_depth_axes() {

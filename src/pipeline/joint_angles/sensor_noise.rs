@@ -1,14 +1,16 @@
-//! Noise of the sensor, estimated from the recording itself, so that an unknown sensor works out of the box.
+//! Noise of the sensor as the Gaussian methods take it: from a noise model, or estimated from the recording itself, so
+//! that an unknown sensor works out of the box.
 //!
 //! White noise of variance σ² has second differences of variance 6σ²; movement contributes next to nothing to them at
 //! the rate of a camera. Their median absolute value is therefore a robust measure of σ in which jumps do not count.
 
+use super::noise_model::NoiseModel;
 use super::observation::Observations;
 use crate::body::skeleton::point_index;
 use crate::body::{Limb, POINT_COUNT};
 use nalgebra::Vector3;
 
-/// How far the sensor is off.
+/// White noise and slow offset of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorNoise {
     /// Standard deviation of each point's white noise in the axes of the observations, metres.
@@ -18,10 +20,23 @@ pub struct SensorNoise {
 }
 
 impl SensorNoise {
-    /// The noise that a recording shows by itself.
-    pub fn of(observations: &Observations) -> Self {
+    /// Estimated from the recording itself.
+    pub fn adaptive(observations: &Observations) -> Self {
         let white = white_noise(observations);
-        Self { white, slow_offset: slow_offset(observations, &white) }
+        let slow_offset = slow_offset(observations, &white);
+        Self { white, slow_offset }
+    }
+
+    /// That of a noise model, turned into the axes of the observations. The offset is the root mean square of the
+    /// points': the Gaussian methods take one for all.
+    pub fn of_model(model: &NoiseModel, observations: &Observations) -> Self {
+        let covariance = model.observation_in(&observations.subject_from_world);
+        let sd = |row: usize| covariance[(row, row)].max(0.0).sqrt();
+        let mean_square = model.slow_offset.iter().map(|sd| sd.powi(2)).sum::<f64>() / POINT_COUNT as f64;
+        Self {
+            white: std::array::from_fn(|p| Vector3::from_fn(|axis, _| sd(3 * p + axis))),
+            slow_offset: mean_square.sqrt(),
+        }
     }
 }
 
@@ -60,33 +75,44 @@ const OFFSET_PER_LENGTH_CHANGE: f64 = 5.0;
 
 /// Standard deviation of the offset of a point's coordinates that outlasts averaging, metres, from how much the bones
 /// seem to change in length between blocks of time.
-fn slow_offset(observations: &Observations, white: &[Vector3<f64>; POINT_COUNT]) -> f64 {
-    let interval = observations.duration_s() / (observations.len().max(2) - 1) as f64;
-    let frames = ((BLOCK_S / interval.max(1e-3)).round() as usize).clamp(1, 1000);
-    let mut variances = Vec::with_capacity(8);
-    for limb in Limb::ALL {
-        for level in 1..3 {
-            let (a, b) = (point_index(limb, level - 1), point_index(limb, level));
-            let lengths = block_lengths(observations, frames, a, b);
-            if lengths.len() < 3 {
-                continue;
-            }
-            let n = lengths.len() as f64;
-            let mean = lengths.iter().sum::<f64>() / n;
-            let observed = lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0);
-            // A median of n normal numbers has π/2 of the variance of their mean.
-            let per_frame = (white[a].norm_squared() + white[b].norm_squared()) / 3.0;
-            let expected = std::f64::consts::FRAC_PI_2 * per_frame / frames as f64;
-            // Two standard errors of a variance: what white noise alone may look like.
-            let chance = 2.0 * (2.0 / (n - 1.0)).sqrt();
-            variances.push((observed - expected * (1.0 + chance)).max(0.0));
-        }
-    }
+pub fn slow_offset(observations: &Observations, white: &[Vector3<f64>; POINT_COUNT]) -> f64 {
+    let mut variances: Vec<f64> = length_variances(observations, white).into_iter().flatten().collect();
     // The median: a hand that a sensor hardly sees must not speak for the body.
     variances.sort_by(f64::total_cmp);
-    let variance = variances.get(variances.len() / 2).copied().unwrap_or(0.0);
+    offset_of_length_variance(variances.get(variances.len() / 2).copied().unwrap_or(0.0))
+}
+
+/// Standard deviation of a point's slow offset from the variance of a bone's length, metres.
+pub(super) fn offset_of_length_variance(variance: f64) -> f64 {
     // Two points make a bone.
     OFFSET_PER_LENGTH_CHANGE * (variance / 2.0).sqrt()
+}
+
+/// Variance of each bone's length between blocks of time beyond what white noise explains, m²: proximal and distal bone
+/// of each limb; `None` for a bone that is hardly seen.
+pub(super) fn length_variances(
+    observations: &Observations,
+    white: &[Vector3<f64>; POINT_COUNT],
+) -> [Option<f64>; 2 * Limb::ALL.len()] {
+    let interval = observations.duration_s() / (observations.len().max(2) - 1) as f64;
+    let frames = ((BLOCK_S / interval.max(1e-3)).round() as usize).clamp(1, 1000);
+    std::array::from_fn(|bone| {
+        let limb = Limb::ALL[bone / 2];
+        let (a, b) = (point_index(limb, bone % 2), point_index(limb, bone % 2 + 1));
+        let lengths = block_lengths(observations, frames, a, b);
+        if lengths.len() < 3 {
+            return None;
+        }
+        let n = lengths.len() as f64;
+        let mean = lengths.iter().sum::<f64>() / n;
+        let observed = lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        // A median of n normal numbers has π/2 of the variance of their mean.
+        let per_frame = (white[a].norm_squared() + white[b].norm_squared()) / 3.0;
+        let expected = std::f64::consts::FRAC_PI_2 * per_frame / frames as f64;
+        // Two standard errors of a variance: what white noise alone may look like.
+        let chance = 2.0 * (2.0 / (n - 1.0)).sqrt();
+        Some((observed - expected * (1.0 + chance)).max(0.0))
+    })
 }
 
 /// Median distance of two points in each block of frames in which both were mostly seen, metres. The distance is taken

@@ -1,10 +1,13 @@
 //! Recordings and results made in code.
 
 use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
-use surefoot::assessment::{Assessment, Provenance, Quality, Series, Settings};
+use surefoot::assessment::{Assessment, NoiseModelReference, Provenance, Quality, Series, Settings};
 use surefoot::body::Joint;
 use surefoot::recording::{Header, Recording, SkeletonRecording, encode};
+use surefoot::synthetic::sensor::white_noise;
 use surefoot::worker::Assess;
 
 /// Time between two frames, nanoseconds: 30 Hz.
@@ -43,6 +46,14 @@ pub fn recording(n: usize) -> Recording {
     }
 }
 
+/// A person who stands still for some seconds before a sensor with the noise of Table 1.
+pub fn standing_still(seconds: usize, seed: u64) -> Vec<u8> {
+    let mut recording = recording(30 * seconds);
+    let skeleton = recording.skeleton.as_mut().unwrap();
+    white_noise::add(skeleton, white_noise::table1_sd_mm, &mut ChaCha8Rng::seed_from_u64(seed));
+    encode::mcap(&recording).unwrap()
+}
+
 /// Two seconds as JSON.
 pub fn json_recording() -> Vec<u8> {
     encode::json(&recording(60)).unwrap()
@@ -58,7 +69,7 @@ pub const KNOWN_SAMPLES: usize = 5000;
 
 /// A computation whose result is known: a ramp in one channel, a constant with gaps in the other.
 pub fn known_result() -> Arc<Assess> {
-    Arc::new(|_, _, settings: &Settings, _| {
+    Arc::new(|_, _, settings: &Settings, _, _| {
         let mut ramp = Series::empty("right_knee_flexion_deg", KNOWN_SAMPLES);
         let mut gaps = Series::empty("trunk_flexion_deg", KNOWN_SAMPLES);
         for t in 0..KNOWN_SAMPLES {
@@ -83,6 +94,7 @@ pub fn known_result() -> Arc<Assess> {
                 pipeline: "joint_angles".into(),
                 method: method_of(settings),
                 settings: settings.clone(),
+                noise_model: Some(NoiseModelReference::adaptive()),
                 seed: 1,
                 recording_sha256: String::new(),
             },
@@ -91,6 +103,8 @@ pub fn known_result() -> Arc<Assess> {
 }
 
 fn method_of(settings: &Settings) -> String {
-    let Settings::JointAngles(settings) = settings;
-    settings.method.name().to_owned()
+    match settings {
+        Settings::JointAngles(settings) => settings.method.name().to_owned(),
+        Settings::NoiseModel(_) => panic!("a training is no assessment"),
+    }
 }
