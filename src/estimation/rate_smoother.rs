@@ -13,6 +13,7 @@
 //! The backward pass needs no inverse of the predicted covariance, which becomes singular when a direction is known
 //! exactly. All matrices are kept as `D × D` blocks of posture (p) and rate (r).
 
+use super::rate_dynamics::RateStep;
 use nalgebra::{SMatrix, SVector};
 
 /// A space of postures, and what an observation says at one of them.
@@ -28,6 +29,17 @@ pub trait RateModel<const D: usize> {
 
     /// Information and gradient of frame `t`'s observation at a posture.
     fn information(&self, t: usize, posture: &Self::Posture) -> (SMatrix<f64, D, D>, SVector<f64, D>);
+
+    /// The same around a posture that is known up to a covariance. A method that looks at more than the tangent at the
+    /// posture asks for the covariance.
+    fn information_around(
+        &self,
+        t: usize,
+        posture: &Self::Posture,
+        _covariance: impl Fn() -> SMatrix<f64, D, D>,
+    ) -> (SMatrix<f64, D, D>, SVector<f64, D>) {
+        self.information(t, posture)
+    }
 
     /// Spectral density of the acceleration in each direction during the interval that ends at frame `t`, rad²/s³.
     fn acceleration_density(&self, t: usize) -> SVector<f64, D>;
@@ -114,24 +126,19 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         if interval_s <= 0.0 {
             return (0.0, 1.0);
         }
-        let decay = self.settings.rate_decay_s;
-        let s = interval_s / decay;
-        let (a, b) = (-decay * (-s).exp_m1(), (-s).exp());
+        let step = RateStep::over(interval_s, self.settings.rate_decay_s);
+        let (a, b) = (step.reach, step.decay);
         let belief = &mut self.belief;
         belief.posture = model.moved(&belief.posture, &(belief.rate * a));
         belief.rate *= b;
         belief.pp += (belief.pr + belief.pr.transpose()) * a + belief.rr * (a * a);
         belief.pr = (belief.pr + belief.rr * a) * b;
         belief.rr *= b * b;
-        // Integrals of white acceleration through the decaying rate.
-        let to_posture = 0.5 * decay.powi(3) * (2.0 * s - 3.0 + 4.0 * (-s).exp() - (-2.0 * s).exp());
-        let to_both = 0.5 * decay.powi(2) * (-s).exp_m1().powi(2);
-        let to_rate = -0.5 * decay * (-2.0 * s).exp_m1();
         let density = model.acceleration_density(t);
         for d in 0..D {
-            belief.pp[(d, d)] += density[d] * to_posture;
-            belief.pr[(d, d)] += density[d] * to_both;
-            belief.rr[(d, d)] += density[d] * to_rate;
+            belief.pp[(d, d)] += density[d] * step.to_posture;
+            belief.pr[(d, d)] += density[d] * step.to_both;
+            belief.rr[(d, d)] += density[d] * step.to_rate;
         }
         (a, b)
     }
@@ -146,7 +153,9 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         let mut innovation = SVector::zeros();
         for _ in 0..self.settings.iterations {
             let gradient;
-            (information, gradient) = model.information(t, &posture);
+            // `weight` is that of the iteration before, so this is the covariance around its posture.
+            let covariance = || belief.pp - belief.pp * weight * belief.pp;
+            (information, gradient) = model.information_around(t, &posture, covariance);
             let from_prediction = model.step_between(&predicted, &posture);
             let system = Block::identity() + information * belief.pp;
             // I + H P has only eigenvalues ≥ 1, since H and P are positive semi-definite: the solution exists.
@@ -216,15 +225,15 @@ fn symmetrize<const D: usize>(matrix: &mut Block<D>) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
     /// Two independent coordinates, the first seen, the second seen together with the first.
-    struct Line {
-        seen: Vec<Option<(f64, f64)>>,
-        density: f64,
-        noise: f64,
+    pub(crate) struct Line {
+        pub(crate) seen: Vec<Option<(f64, f64)>>,
+        pub(crate) density: f64,
+        pub(crate) noise: f64,
     }
 
     impl RateModel<2> for Line {
@@ -250,17 +259,17 @@ mod tests {
         }
     }
 
-    const SETTINGS: RateSettings =
+    pub(crate) const SETTINGS: RateSettings =
         RateSettings { rate_decay_s: 0.8, initial_sd: 2.0, initial_rate_sd: 1.5, iterations: 1 };
 
-    fn model() -> Line {
+    pub(crate) fn model() -> Line {
         let value = |t: usize| (t as f64 * 0.4).sin();
         let seen = (0..12).map(|t| (!(5..8).contains(&t)).then(|| (value(t), value(t) + 0.1 * t as f64))).collect();
         Line { seen, density: 0.7, noise: 0.05 }
     }
 
     /// The same model solved as one least-squares problem over all frames: the exact posterior of a linear model.
-    fn batch(model: &Line, intervals: &[f64]) -> Vec<(SVector<f64, 2>, SMatrix<f64, 2, 2>)> {
+    pub(crate) fn batch(model: &Line, intervals: &[f64]) -> Vec<(SVector<f64, 2>, SMatrix<f64, 2, 2>)> {
         let n = intervals.len();
         let mut information = DMatrix::<f64>::zeros(4 * n, 4 * n);
         let mut gradient = DVector::<f64>::zeros(4 * n);
