@@ -108,7 +108,7 @@ impl Validate for JobRequest {
 
     fn validate_into(&self, _: &(), parent: &mut dyn FnMut() -> garde::Path, report: &mut garde::Report) {
         let Settings::JointAngles(settings) = &self.0;
-        if !(16..=65_536).contains(&settings.particles) {
+        if settings.particles.is_some_and(|n| !(16..=65_536).contains(&n)) {
             report.append(parent().join("particles"), garde::Error::new("must lie between 16 and 65536"));
         }
         if !(0.0..=1.0).contains(&settings.min_confidence) {

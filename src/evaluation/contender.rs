@@ -30,7 +30,7 @@ impl Contender {
 
 /// A name that no contender has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is not a method; there are raw, iekf, particle, ik and nite")]
+#[error("`{0}` is not a method; there are raw, iekf, ukf, guided, particle, ik and nite")]
 pub struct UnknownContender(pub String);
 
 impl FromStr for Contender {
@@ -56,6 +56,6 @@ mod tests {
         for contender in Contender::all() {
             assert_eq!(contender.name().parse(), Ok(contender));
         }
-        assert!("ukf".parse::<Contender>().unwrap_err().to_string().contains("iekf"));
+        assert!("smoother".parse::<Contender>().unwrap_err().to_string().contains("iekf"));
     }
 }

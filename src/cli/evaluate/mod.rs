@@ -49,12 +49,12 @@ struct JointAngleArgs {
     /// Simulated subjects for each exercise
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
-    /// Methods, comma separated: raw, iekf, particle, ik, nite
+    /// Methods, comma separated: raw, iekf, ukf, guided, particle, ik, nite
     #[arg(long, value_delimiter = ',', default_value = "raw,ik,particle,iekf,nite", value_name = "LIST")]
     methods: Vec<Contender>,
-    /// Particles of the paper's filter
-    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536))]
-    particles: u32,
+    /// Particles of particle (512 when not given) and guided (96)
+    #[arg(long, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "N")]
+    particles: Option<u32>,
     /// Seed of the methods' random streams
     #[arg(long, default_value_t = 1)]
     seed: u64,

@@ -4,6 +4,7 @@
 //! of the posture in every frame → anatomical angles with intervals and flags.
 
 pub mod calibration;
+pub mod guided;
 pub mod iekf;
 pub mod inverse_kinematics;
 pub mod middleware;
@@ -14,6 +15,7 @@ pub mod particle_model;
 pub mod posterior;
 pub mod sensor_noise;
 pub mod state_space;
+pub mod ukf;
 
 use super::PipelineError;
 use crate::assessment::{Assessment, JointAngleSettings, Method, Provenance, Quality, Series, Settings, Warning};
@@ -21,6 +23,7 @@ use crate::body::Pose;
 use crate::progress::{Monitor, Step};
 use crate::recording::Recording;
 use calibration::{Calibration, calibrate};
+use guided::Sampling;
 use noise_model::NoiseModel;
 use observation::{ALL_SEEN, Observations};
 use posterior::{Posterior, SeriesBuilder};
@@ -55,10 +58,16 @@ pub fn assess(
     match settings.method {
         Method::Particle => {
             let noise = NoiseModel::nite_table1();
-            let sizes =
-                particle::run(&observations, &calibration, noise, settings.particles, settings.seed, monitor, emit)?;
+            let particles = settings.chosen_particles();
+            let sizes = particle::run(&observations, &calibration, noise, particles, settings.seed, monitor, emit)?;
             quality.effective_sample_size = Some(sizes);
         }
+        Method::Guided => {
+            let sampling = Sampling { particles: settings.chosen_particles(), seed: settings.seed };
+            let sizes = guided::run(&observations, &calibration, &Tuning::default(), sampling, pass, monitor, emit)?;
+            quality.effective_sample_size = Some(sizes);
+        }
+        Method::Ukf => ukf::run(&observations, &calibration, &Tuning::default(), pass, monitor, emit)?,
         Method::Iekf => iekf::run(&observations, &calibration, &Tuning::default(), pass, monitor, emit)?,
         Method::Ik => run_closed_geometry(&observations, &calibration, monitor, emit)?,
         Method::Nite => middleware::run(skeleton, &observations, &calibration, monitor, emit)?,

@@ -14,7 +14,7 @@ use crate::assessment::series::FLAG_OUTLIER;
 use crate::body::kinematics::{forward_kinematics, forward_kinematics_with_jacobian};
 use crate::body::pose::{POSE_DIMENSION, PoseVector, attitude_offset, hinge_offset};
 use crate::body::skeleton::point_index;
-use crate::body::{Limb, POINT_COUNT, Pose, Skeleton};
+use crate::body::{Limb, OBSERVATION_DIMENSION, POINT_COUNT, Pose, Skeleton};
 use crate::estimation::rate_smoother::{RateModel, RateSettings};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -228,10 +228,8 @@ impl StateSpace<'_> {
         gradient: &mut SVector<f64, 7>,
     ) {
         let axis = pose.limbs[limb.index()] * limb.reference_direction();
-        let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.limbs[limb.index()]);
-        let twist = 2.0 * quaternion.imag().dot(&limb.reference_direction()).atan2(quaternion.w);
-        let twist = twist - std::f64::consts::TAU * (twist / std::f64::consts::TAU).round();
-        let precision = interval_s / (self.tuning.twist_time_s * self.tuning.twist_sd.powi(2));
+        let twist = twist_of(pose, limb);
+        let precision = self.twist_precision(interval_s);
         for row in 0..3 {
             gradient[3 + row] -= precision * twist * axis[row];
             for column in 0..3 {
@@ -241,11 +239,99 @@ impl StateSpace<'_> {
     }
 }
 
+/// Rows of [`StateSpace::whitened_residuals`]: three for each point, one for each limb's twist.
+pub const RESIDUAL_DIMENSION: usize = OBSERVATION_DIMENSION + 4;
+
+/// Residuals in standard deviations, points first, then twists.
+pub type Residuals = SVector<f64, RESIDUAL_DIMENSION>;
+
+/// Twist of a limb about its own axis, radians, −π to π.
+fn twist_of(pose: &Pose, limb: Limb) -> f64 {
+    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.limbs[limb.index()]);
+    let twist = 2.0 * quaternion.imag().dot(&limb.reference_direction()).atan2(quaternion.w);
+    twist - std::f64::consts::TAU * (twist / std::f64::consts::TAU).round()
+}
+
+/// The model for methods that look at the observation itself instead of its derivative.
+impl StateSpace<'_> {
+    /// What frame `t` differs from a posture, each row over its standard deviation; 0 for points not seen.
+    pub fn whitened_residuals(&self, t: usize, pose: &Pose) -> Residuals {
+        let points = forward_kinematics(self.skeleton, pose);
+        let mut residuals = Residuals::zeros();
+        for (p, point) in points.iter().enumerate() {
+            let residual = self.observations.points[t][p] - point;
+            if residual.x.is_finite() {
+                let whitened = residual.component_mul(&self.precision[p].map(f64::sqrt));
+                residuals.fixed_rows_mut::<3>(3 * p).copy_from(&whitened);
+            }
+        }
+        let twist_precision = self.twist_precision(self.observations.interval_s(t).max(1e-3));
+        for limb in Limb::ALL {
+            residuals[OBSERVATION_DIMENSION + limb.index()] = -twist_of(pose, limb) * twist_precision.sqrt();
+        }
+        residuals
+    }
+
+    /// Student-t weight of each row from the expected squares of all: one for a point, 1 for a twist.
+    pub fn row_weights(&self, squares: &Residuals) -> Residuals {
+        let dof = self.tuning.student_t_dof;
+        Residuals::from_fn(|row, _| {
+            if row >= OBSERVATION_DIMENSION {
+                return 1.0;
+            }
+            let distance = squares.fixed_rows::<3>(3 * (row / 3)).sum();
+            (dof + 3.0) / (dof + distance)
+        })
+    }
+
+    /// Log-likelihood of frame `t` at a posture, up to a constant of the frame: a trivariate Student-t distribution for each
+    /// point, the twist prior for each limb. Its slope is the gradient of [`RateModel::information`].
+    pub fn log_likelihood(&self, t: usize, pose: &Pose) -> f64 {
+        let residuals = self.whitened_residuals(t, pose);
+        let dof = self.tuning.student_t_dof;
+        let of_point = |p: usize| (residuals.fixed_rows::<3>(3 * p).norm_squared() / dof).ln_1p();
+        let points: f64 = (0..POINT_COUNT).map(of_point).sum();
+        -0.5 * ((dof + 3.0) * points + residuals.fixed_rows::<4>(OBSERVATION_DIMENSION).norm_squared())
+    }
+
+    /// Precision of the twist prior in a frame, rad⁻².
+    fn twist_precision(&self, interval_s: f64) -> f64 {
+        interval_s / (self.tuning.twist_time_s * self.tuning.twist_sd.powi(2))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::assessment::quality::CalibrationQuality;
     use nalgebra::Rotation3;
+
+    #[test]
+    fn the_slope_of_the_log_likelihood_is_the_gradient_also_where_points_are_off_or_lost() {
+        let skeleton = Skeleton::of_stature(1.7);
+        let truth = Pose::from_vector(&PoseVector::from_fn(|i, _| 0.3 * (i as f64).sin() + 0.2));
+        let mut points = forward_kinematics(&skeleton, &truth);
+        points[2] += Vector3::new(0.4, -0.2, 0.1);
+        points[4] = Vector3::repeat(f64::NAN);
+        let time_ns = vec![0, 33_333_333];
+        let observations = Observations { time_ns, points: vec![points; 2], subject_from_world: Rotation3::identity() };
+        let tuning = Tuning::default();
+        let quality = CalibrationQuality { source: "test".into(), window_s: None, n_frames: 1, segments: Vec::new() };
+        let calibration = Calibration { skeleton, quality, warnings: Vec::new() };
+        let model = StateSpace::new(&observations, &calibration, &tuning);
+        let pose = truth.perturbed(&PoseVector::from_fn(|i, _| 0.05 * (i as f64).cos()));
+        let (_, gradient) = model.information(1, &pose);
+        for d in 0..POSE_DIMENSION {
+            let step = PoseVector::from_fn(|i, _| if i == d { 1e-5 } else { 0.0 });
+            let ahead = model.log_likelihood(1, &pose.perturbed(&step));
+            let behind = model.log_likelihood(1, &pose.perturbed(&-step));
+            let slope = (ahead - behind) / 2e-5;
+            // The gradient takes a limb's own axis as the direction of twist, which holds for limbs that hardly swing.
+            let is_swung = (3..15).contains(&d);
+            let tolerance = if is_swung { 0.05 * gradient.amax() } else { 1e-4 * gradient.amax() };
+            assert!((slope - gradient[d]).abs() < tolerance, "{d}: {slope} for {}", gradient[d]);
+        }
+    }
 
     #[test]
     fn the_information_is_that_of_the_full_jacobian() {
