@@ -73,10 +73,14 @@ fn methods(criterion: &mut Criterion) {
     let monitor = Monitor::default();
     let mut group = criterion.benchmark_group("frames");
     group.throughput(Throughput::Elements(FRAMES as u64)).sample_size(10);
-    let particle = [128, 512, 2048].map(|particles| (Method::Particle, particles));
-    for (method, particles) in particle.into_iter().chain([(Method::Iekf, 512), (Method::Ik, 512)]) {
+    let particle = [128, 512, 2048].map(|particles| (Method::Particle, Some(particles)));
+    let others = Method::ALL.into_iter().filter(|m| !matches!(m, Method::Particle | Method::Nite));
+    for (method, particles) in particle.into_iter().chain(others.map(|method| (method, None))) {
         let settings = JointAngleSettings { method, particles, ..JointAngleSettings::default() };
-        let name = if method == Method::Particle { format!("particle/{particles}") } else { method.name().to_owned() };
+        let name = match method.has_particles() {
+            true => format!("{method}/{}", settings.chosen_particles()),
+            false => method.name().to_owned(),
+        };
         group.bench_function(BenchmarkId::from_parameter(name), |b| {
             b.iter(|| assess(&recording, &settings, &monitor).map(|a| a.summary.len()));
         });

@@ -115,7 +115,7 @@ impl Validate for JobRequest {
                 return report.append(parent().join("pipeline"), garde::Error::new(message));
             }
         };
-        if !(16..=65_536).contains(&settings.particles) {
+        if settings.particles.is_some_and(|n| !(16..=65_536).contains(&n)) {
             report.append(parent().join("particles"), garde::Error::new("must lie between 16 and 65536"));
         }
         if !(0.0..=1.0).contains(&settings.min_confidence) {

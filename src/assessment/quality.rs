@@ -40,6 +40,15 @@ pub struct EffectiveSampleSize {
     pub min: f64,
 }
 
+impl EffectiveSampleSize {
+    /// Summary of the sizes of all frames.
+    pub fn of_frames(particles: u32, mut sizes: Vec<f64>) -> Self {
+        sizes.sort_by(f64::total_cmp);
+        let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+        Self { particles, median, min: sizes.first().copied().unwrap_or(0.0) }
+    }
+}
+
 /// How segment lengths were found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CalibrationQuality {

@@ -25,15 +25,16 @@ use std::time::Duration;
 pub struct Args {
     /// Recording, .mcap or .json; the content decides
     recording: PathBuf,
-    /// iekf (the default), particle (the paper's particle filter), ik (closed geometry), nite (middleware's rotations)
+    /// iekf (the default), ukf (unscented), guided (particles that look before they leap), particle (the paper's particle
+    /// filter), ik (closed geometry), nite (middleware's rotations)
     #[arg(long, default_value_t = Method::Iekf, value_name = "METHOD")]
     method: Method,
     /// smooth (over the whole recording; the default of methods that can) or filter (from the frames up to each)
     #[arg(long, value_name = "PASS")]
     pass: Option<Pass>,
-    /// Particles of the paper's filter
-    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536))]
-    particles: u32,
+    /// Particles of particle (512 when not given) and guided (96)
+    #[arg(long, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "N")]
+    particles: Option<u32>,
     /// Seed of the random streams
     #[arg(long, default_value_t = 1)]
     seed: u64,

@@ -14,6 +14,7 @@
 //! exactly. All matrices are kept as `D × D` blocks of posture (p) and rate (r); the history keeps symmetric ones as
 //! triangles, `2.5 D² + 3.5 D` numbers a frame.
 
+use super::rate_dynamics::RateStep;
 use nalgebra::{SMatrix, SVector};
 
 /// A space of postures, and what an observation says at one of them.
@@ -21,7 +22,7 @@ pub trait RateModel<const D: usize> {
     /// A posture.
     type Posture: Clone;
     /// What is seen in one frame.
-    type Observation: ?Sized;
+    type Observation;
 
     /// The posture after a small step.
     fn moved(&self, posture: &Self::Posture, step: &SVector<f64, D>) -> Self::Posture;
@@ -29,13 +30,23 @@ pub trait RateModel<const D: usize> {
     /// The step that leads from `from` to `to`.
     fn step_between(&self, from: &Self::Posture, to: &Self::Posture) -> SVector<f64, D>;
 
-    /// Information and gradient of an observation at a posture, `interval_s` seconds after the frame before.
+    /// Information and gradient of an observation at a posture.
     fn information(
         &self,
         observation: &Self::Observation,
-        interval_s: f64,
         posture: &Self::Posture,
     ) -> (SMatrix<f64, D, D>, SVector<f64, D>);
+
+    /// The same around a posture that is known up to a covariance; asked once in each iteration of a frame. A method that
+    /// looks at more than the tangent at the posture asks for the covariance.
+    fn information_around(
+        &self,
+        observation: &Self::Observation,
+        posture: &Self::Posture,
+        _covariance: impl Fn() -> SMatrix<f64, D, D>,
+    ) -> (SMatrix<f64, D, D>, SVector<f64, D>) {
+        self.information(observation, posture)
+    }
 
     /// Spectral density of the acceleration in each direction, rad²/s³.
     fn acceleration_density(&self) -> SVector<f64, D>;
@@ -111,7 +122,7 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         interval_s: f64,
     ) -> Estimate<P, D> {
         self.predict(model, interval_s);
-        self.update(model, observation, interval_s);
+        self.update(model, observation);
         Estimate { posture: self.belief.posture.clone(), rate: self.belief.rate, covariance: self.belief.pp }
     }
 
@@ -120,30 +131,25 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
             self.step = (0.0, 1.0);
             return;
         }
-        let decay = self.settings.rate_decay_s;
-        let s = interval_s / decay;
-        let (a, b) = (-decay * (-s).exp_m1(), (-s).exp());
+        let step = RateStep::over(interval_s, self.settings.rate_decay_s);
+        let (a, b) = (step.reach, step.decay);
         let belief = &mut self.belief;
         belief.posture = model.moved(&belief.posture, &(belief.rate * a));
         belief.rate *= b;
         belief.pp += (belief.pr + belief.pr.transpose()) * a + belief.rr * (a * a);
         belief.pr = (belief.pr + belief.rr * a) * b;
         belief.rr *= b * b;
-        // Integrals of white acceleration through the decaying rate.
-        let to_posture = 0.5 * decay.powi(3) * (2.0 * s - 3.0 + 4.0 * (-s).exp() - (-2.0 * s).exp());
-        let to_both = 0.5 * decay.powi(2) * (-s).exp_m1().powi(2);
-        let to_rate = -0.5 * decay * (-2.0 * s).exp_m1();
         let density = model.acceleration_density();
         for d in 0..D {
-            belief.pp[(d, d)] += density[d] * to_posture;
-            belief.pr[(d, d)] += density[d] * to_both;
-            belief.rr[(d, d)] += density[d] * to_rate;
+            belief.pp[(d, d)] += density[d] * step.to_posture;
+            belief.pr[(d, d)] += density[d] * step.to_both;
+            belief.rr[(d, d)] += density[d] * step.to_rate;
         }
         self.step = (a, b);
     }
 
     /// Gauss–Newton on the posterior: `δ = P (I + H P)⁻¹ (g + H e)` with `e` from the prediction to the iterate.
-    fn update<M: RateModel<D, Posture = P>>(&mut self, model: &M, observation: &M::Observation, interval_s: f64) {
+    fn update<M: RateModel<D, Posture = P>>(&mut self, model: &M, observation: &M::Observation) {
         let belief = &mut self.belief;
         let predicted = belief.posture.clone();
         let mut posture = predicted.clone();
@@ -152,7 +158,9 @@ impl<P: Clone, const D: usize> RateFilter<P, D> {
         let mut innovation = SVector::zeros();
         for _ in 0..self.settings.iterations {
             let gradient;
-            (information, gradient) = model.information(observation, interval_s, &posture);
+            // `weight` is that of the iteration before, so this is the covariance around its posture.
+            let covariance = || belief.pp - belief.pp * weight * belief.pp;
+            (information, gradient) = model.information_around(observation, &posture, covariance);
             let from_prediction = model.step_between(&predicted, &posture);
             let system = Block::identity() + information * belief.pp;
             // I + H P has only eigenvalues ≥ 1, since H and P are positive semi-definite: the solution exists.
@@ -279,14 +287,14 @@ fn symmetrize<const D: usize>(matrix: &mut Block<D>) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
     /// Two independent coordinates, the first seen, the second seen together with the first.
-    struct Line {
-        density: f64,
-        noise: f64,
+    pub(crate) struct Line {
+        pub(crate) density: f64,
+        pub(crate) noise: f64,
     }
 
     impl RateModel<2> for Line {
@@ -304,7 +312,6 @@ mod tests {
         fn information(
             &self,
             observation: &Self::Observation,
-            _interval_s: f64,
             posture: &Self::Posture,
         ) -> (SMatrix<f64, 2, 2>, SVector<f64, 2>) {
             let Some((first, sum)) = *observation else { return (SMatrix::zeros(), SVector::zeros()) };
@@ -318,17 +325,19 @@ mod tests {
         }
     }
 
-    const SETTINGS: RateSettings =
+    pub(crate) const SETTINGS: RateSettings =
         RateSettings { rate_decay_s: 0.8, initial_sd: 2.0, initial_rate_sd: 1.5, iterations: 1 };
 
+    pub(crate) const LINE: Line = Line { density: 0.7, noise: 0.05 };
+
     /// Twelve frames, of which three are not seen.
-    fn observations() -> Vec<Option<(f64, f64)>> {
+    pub(crate) fn observations() -> Vec<Option<(f64, f64)>> {
         let value = |t: usize| (t as f64 * 0.4).sin();
         (0..12).map(|t| (!(5..8).contains(&t)).then(|| (value(t), value(t) + 0.1 * t as f64))).collect()
     }
 
     /// The same model solved as one least-squares problem over all frames: the exact posterior of a linear model.
-    fn batch(
+    pub(crate) fn batch(
         model: &Line,
         seen: &[Option<(f64, f64)>],
         intervals: &[f64],
@@ -341,7 +350,7 @@ mod tests {
             information[(2 + d, 2 + d)] += 1.0 / SETTINGS.initial_rate_sd.powi(2);
         }
         for t in 0..n {
-            let (h, g) = model.information(&seen[t], 0.0, &SVector::zeros());
+            let (h, g) = model.information(&seen[t], &SVector::zeros());
             for i in 0..2 {
                 gradient[4 * t + i] += g[i];
                 for j in 0..2 {
@@ -381,7 +390,7 @@ mod tests {
 
     #[test]
     fn the_smoother_is_the_least_squares_solution_over_all_frames_also_through_a_gap() {
-        let (model, seen) = (Line { density: 0.7, noise: 0.05 }, observations());
+        let (model, seen) = (LINE, observations());
         let intervals: Vec<f64> = (0..12).map(|t| if t == 0 { 0.0 } else { 0.03 + 0.01 * (t % 3) as f64 }).collect();
         let mut filter = RateFilter::new(SVector::zeros(), SETTINGS);
         let mut history = RateHistory::with_capacity(12);

@@ -56,8 +56,8 @@ impl Contender {
         std::iter::once(Contender::Raw).chain(Method::ALL.map(Contender::of)).collect()
     }
 
-    /// Raw first, then every method with its own pass, the filter of those that can smooth, and a contender for each
-    /// number of particles of those that have particles.
+    /// Raw first, then every method with its own pass, the filter of those that can smooth and have no particles, and a
+    /// contender for each number of particles of those that have particles.
     pub fn table2(particles: &[u32]) -> Vec<Contender> {
         let mut all = vec![Contender::Raw];
         for method in Method::ALL {
@@ -84,7 +84,7 @@ impl Contender {
         match self {
             Contender::Raw => None,
             Contender::Method { method, pass, particles } => {
-                let particles = particles.unwrap_or(others.particles);
+                let particles = particles.or(others.particles);
                 Some(JointAngleSettings { method, pass, particles, ..others.clone() })
             }
         }
@@ -243,7 +243,7 @@ mod tests {
     fn a_contender_s_settings_are_the_run_s_with_its_own_method_pass_and_particles() {
         let run = JointAngleSettings { seed: 7, ..JointAngleSettings::default() };
         let own = "particle/128".parse::<Contender>().unwrap().settings(&run).unwrap();
-        assert_eq!((own.method, own.particles, own.seed), (Method::Particle, 128, 7));
+        assert_eq!((own.method, own.particles, own.seed), (Method::Particle, Some(128), 7));
         assert_eq!(Contender::of(Method::Ik).settings(&run).unwrap().particles, run.particles);
         assert_eq!(Contender::Raw.settings(&run), None);
         let defaults: Vec<_> = Contender::table2(&PAPER_PARTICLES).into_iter().filter(|c| c.is_default()).collect();

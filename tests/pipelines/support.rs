@@ -80,6 +80,12 @@ pub fn lose(recording: Recording, joint: Joint, from_s: f64, to_s: f64) -> Recor
     })
 }
 
+/// The recording with every joint lost between two times, seconds.
+pub fn lose_all(recording: Recording, from_s: f64, to_s: f64) -> Recording {
+    let joints = recording.skeleton.as_ref().expect("a skeleton").joints.clone();
+    joints.into_iter().fold(recording, |recording, joint| lose(recording, joint, from_s, to_s))
+}
+
 /// The part of a recording between two times, seconds, without its truth.
 pub fn cut(recording: Recording, from_s: f64, to_s: f64) -> Recording {
     let mut part = with_skeleton(recording, |skeleton| {

@@ -140,7 +140,12 @@ fn a_sensor_that_repeats_its_frames_has_no_noise_to_learn() {
 
 fn settings(method: Method, noise_model: Option<&str>) -> Settings {
     let noise_model = noise_model.map(str::to_owned);
-    Settings::JointAngles(JointAngleSettings { method, noise_model, particles: 128, ..JointAngleSettings::default() })
+    Settings::JointAngles(JointAngleSettings {
+        method,
+        noise_model,
+        particles: Some(128),
+        ..JointAngleSettings::default()
+    })
 }
 
 #[test]

@@ -73,8 +73,8 @@ struct JointAngleArgs {
     /// Methods, comma separated [default: raw and every method; with --table2 also the filters of those that smooth]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     methods: Vec<Contender>,
-    /// Particles of the methods that have them, comma separated, for those that do not say how many themselves [default:
-    /// 512; with --table2 128,512,2048]
+    /// Particles of the methods that have them, comma separated, for those that do not say how many themselves; 512 for
+    /// particle, 96 for guided when not given [default with --table2: 128,512,2048]
     #[arg(long, value_delimiter = ',', value_name = "LIST",
         value_parser = clap::value_parser!(u32).range(i64::from(*PARTICLES.start())..=i64::from(*PARTICLES.end())))]
     particles: Vec<u32>,
@@ -173,7 +173,7 @@ fn plan(args: &JointAngleArgs) -> anyhow::Result<Plan> {
     // One number is a setting of the run; several are contenders of their own.
     let counts = match particles {
         [one] if !args.table2 => {
-            settings.particles = *one;
+            settings.particles = Some(*one);
             &[]
         }
         several => several,

@@ -114,9 +114,10 @@ fn particles_are_a_setting_when_there_is_one_number_and_contenders_when_there_ar
         (plan.contenders.iter().map(|c| c.name()).collect::<Vec<_>>(), plan.settings.particles)
     };
     let (usual, particles) = names(&[]);
-    assert_eq!((usual.len(), particles), (Contender::all().len(), 512));
+    assert_eq!((usual.len(), particles), (Contender::all().len(), None));
     assert!(usual.contains(&"particle".to_owned()));
-    assert_eq!(names(&["--methods", "particle,ik", "--particles", "64"]), (vec!["particle".into(), "ik".into()], 64));
+    let one = names(&["--methods", "particle,ik", "--particles", "64"]);
+    assert_eq!(one, (vec!["particle".into(), "ik".into()], Some(64)));
     let several = names(&["--methods", "particle,particle/32,ik", "--particles", "32,64"]).0;
     assert_eq!(several, ["particle/32", "particle/64", "ik"]);
     let named = names(&["--methods", "raw,iekf-filter,particle/2048"]).0;

@@ -5,7 +5,7 @@ use crate::evaluation::{Row, Trial};
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 
 fn settings() -> JointAngleSettings {
-    JointAngleSettings { particles: 64, ..JointAngleSettings::default() }
+    JointAngleSettings { particles: Some(64), ..JointAngleSettings::default() }
 }
 
 fn trial(exercise: Exercise, sensor: Preset, seed: u64) -> TrialSource {

@@ -6,6 +6,7 @@
 
 pub mod calibration;
 pub mod events;
+pub mod guided;
 pub mod iekf;
 pub mod inverse_kinematics;
 mod likelihood_kernel;
@@ -20,6 +21,7 @@ pub mod sensor_noise;
 pub mod series_builder;
 pub mod state_space;
 pub mod training;
+pub mod ukf;
 
 use super::{Inputs, PipelineError};
 use crate::assessment::noise_model::find_shipped;
@@ -31,9 +33,10 @@ use crate::progress::{Monitor, Step};
 use crate::recording::Recording;
 use calibration::{Calibration, calibrate};
 use events::{Inspection, Repairs, inspect};
+use guided::Sampling;
 use noise_model::NoiseModel;
 use observation::{ALL_SEEN, Observations};
-use posterior::Posterior;
+use posterior::{Posterior, Summary};
 use sensor_noise::SensorNoise;
 use series_builder::SeriesBuilder;
 use state_space::{StateSpace, Tuning};
@@ -87,17 +90,27 @@ pub fn assess_with(
     match settings.method {
         Method::Particle => {
             let model = noise.model().cloned().unwrap_or_else(NoiseModel::nite_table1);
-            let sizes =
-                particle::run(&observations, &calibration, model, settings.particles, settings.seed, monitor, emit)?;
+            let particles = settings.chosen_particles();
+            let sizes = particle::run(&observations, &calibration, model, particles, settings.seed, monitor, emit)?;
             quality.effective_sample_size = Some(sizes);
         }
-        Method::Iekf => {
+        Method::Iekf | Method::Ukf | Method::Guided => {
             let noise = match noise.model() {
                 Some(model) => SensorNoise::of_model(model, &observations),
                 None => SensorNoise::adaptive(&observations),
             };
-            let model = StateSpace::new(&calibration.skeleton, &noise, &Tuning::default());
-            iekf::run(&observations, model, pass, monitor, |summary| builder.push(summary))?;
+            let tuning = if settings.method == Method::Iekf { Tuning::default() } else { Tuning::rigid() };
+            let model = StateSpace::new(&calibration.skeleton, &noise, &tuning);
+            let emit = |summary: &Summary| builder.push(summary);
+            match settings.method {
+                Method::Guided => {
+                    let sampling = Sampling { particles: settings.chosen_particles(), seed: settings.seed };
+                    let sizes = guided::run(&observations, &model, sampling, pass, monitor, emit)?;
+                    quality.effective_sample_size = Some(sizes);
+                }
+                Method::Ukf => ukf::run(&observations, &model, pass, monitor, emit)?,
+                _ => iekf::run(&observations, &model, pass, monitor, emit)?,
+            }
         }
         Method::Ik => run_closed_geometry(&observations, &calibration, monitor, emit)?,
         Method::Nite => middleware::run(skeleton, &observations, &calibration, monitor, emit)?,

@@ -19,6 +19,15 @@ pub struct Observations {
     pub subject_from_world: Rotation3<f64>,
 }
 
+/// One frame as the Gaussian methods take it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Points relative to the torso joint, metres, in the order of [`point_index`]; NaN where not seen.
+    pub points: Points,
+    /// Time since the frame before, seconds; 0 for the first.
+    pub interval_s: f64,
+}
+
 /// Bit mask of the points seen in a frame.
 pub type SeenMask = u16;
 
@@ -63,6 +72,11 @@ impl Observations {
     /// Time from the previous frame to frame `t`, seconds; 0 for the first.
     pub fn interval_s(&self, t: usize) -> f64 {
         if t == 0 { 0.0 } else { (self.time_ns[t] - self.time_ns[t - 1]) as f64 * 1e-9 }
+    }
+
+    /// Frame `t`.
+    pub fn frame(&self, t: usize) -> Frame {
+        Frame { points: self.points[t], interval_s: self.interval_s(t) }
     }
 
     /// Time from the first to the last frame, seconds.

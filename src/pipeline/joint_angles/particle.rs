@@ -55,10 +55,5 @@ pub fn run(
         });
         monitor.advance(1)?;
     }
-    sizes.sort_by(f64::total_cmp);
-    Ok(EffectiveSampleSize {
-        particles: count as u32,
-        median: sizes.get(sizes.len() / 2).copied().unwrap_or(0.0),
-        min: sizes.first().copied().unwrap_or(0.0),
-    })
+    Ok(EffectiveSampleSize::of_frames(count as u32, sizes))
 }

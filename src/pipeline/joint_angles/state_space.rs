@@ -15,7 +15,7 @@
 //! offset, which stays as long as the posture does and is carried into the angles by one frame's geometry.
 
 use super::inverse_kinematics::pose_from_points;
-use super::observation::{ALL_SEEN, Observations, seen_mask};
+use super::observation::{ALL_SEEN, Frame, Observations, seen_mask};
 use super::posterior::{PoseCovariance, Posterior};
 use super::sensor_noise::SensorNoise;
 use crate::assessment::series::FLAG_OUTLIER;
@@ -23,7 +23,7 @@ use crate::body::kinematics::{Points, forward_kinematics, forward_kinematics_wit
 use crate::body::pose::{POSE_DIMENSION, PoseVector, attitude_offset, hinge_offset};
 use crate::body::range_of_motion::RangeOfMotion;
 use crate::body::skeleton::point_index;
-use crate::body::{Limb, POINT_COUNT, Pose, Skeleton};
+use crate::body::{Limb, OBSERVATION_DIMENSION, POINT_COUNT, Pose, Skeleton};
 use crate::estimation::rate_smoother::{RateModel, RateSettings};
 use crate::estimation::truncated_normal::truncated_mean;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -56,6 +56,14 @@ pub struct Tuning {
     pub limb_density: f64,
     /// How postures and rates start and decay.
     pub rates: RateSettings,
+}
+
+impl Tuning {
+    /// The variant without slacks, for methods that ask for the likelihood itself: their weights are exact only where it is
+    /// a product over points, and slacks tie the points of a limb together.
+    pub fn rigid() -> Self {
+        Self { root_slack: 0.0, length_slack: 0.0, ..Self::default() }
+    }
 }
 
 impl Default for Tuning {
@@ -94,8 +102,9 @@ pub struct StateSpace {
     precision: [Vector3<f64>; POINT_COUNT],
     /// Offset of a point's coordinates that no averaging over time takes away, metres.
     slow_offset: f64,
-    /// Inverse variances of a limb's slacks: displacement of the root (3), length of the two segments, m⁻².
-    slack_precision: SVector<f64, SLACKS>,
+    /// Inverse variances of a limb's slacks: displacement of the root (3), length of the two segments, m⁻²; `None` when
+    /// the tuning has none.
+    slack_precision: Option<SVector<f64, SLACKS>>,
 }
 
 /// Slacks of a limb.
@@ -115,15 +124,16 @@ impl StateSpace {
             let share = tuning.level_share[p % 3];
             noise.white[p].map(|sd| 1.0 / (sd.powi(2) + (share * model_sd).powi(2)))
         });
-        let [root, length] =
-            [tuning.root_slack, tuning.length_slack].map(|share| (share * noise.slow_offset).max(LEAST_SLACK).powi(-2));
+        let shares = [tuning.root_slack, tuning.length_slack];
+        let [root, length] = shares.map(|share| (share * noise.slow_offset).max(LEAST_SLACK).powi(-2));
+        let has_slacks = shares != [0.0; 2];
         Self {
             skeleton: skeleton.clone(),
             tuning: tuning.clone(),
             range: RangeOfMotion::healthy_adult(),
             precision,
             slow_offset,
-            slack_precision: SVector::from([root, root, root, length, length]),
+            slack_precision: has_slacks.then(|| SVector::from([root, root, root, length, length])),
         }
     }
 
@@ -188,7 +198,7 @@ impl StateSpace {
 
 impl RateModel<POSE_DIMENSION> for StateSpace {
     type Posture = Pose;
-    type Observation = Points;
+    type Observation = Frame;
 
     fn moved(&self, posture: &Pose, step: &PoseVector) -> Pose {
         posture.perturbed(step)
@@ -198,11 +208,11 @@ impl RateModel<POSE_DIMENSION> for StateSpace {
         to.error_from(from)
     }
 
-    fn information(&self, observed: &Points, interval_s: f64, pose: &Pose) -> (PoseCovariance, PoseVector) {
+    fn information(&self, frame: &Frame, pose: &Pose) -> (PoseCovariance, PoseVector) {
         let mut information = PoseCovariance::zeros();
         let mut gradient = PoseVector::zeros();
         for limb in Limb::ALL {
-            let (limb_information, limb_gradient) = self.limb_information(observed, pose, limb, interval_s.max(1e-3));
+            let (limb_information, limb_gradient) = self.limb_information(frame, pose, limb);
             let a = attitude_offset(limb.index());
             let columns = [0, 1, 2, a, a + 1, a + 2, hinge_offset(limb.index())];
             for (i, row) in columns.into_iter().enumerate() {
@@ -223,13 +233,7 @@ impl RateModel<POSE_DIMENSION> for StateSpace {
 impl StateSpace {
     /// Information and gradient of one limb with respect to trunk (3), limb attitude (3) and hinge (1), its slacks
     /// marginalised.
-    fn limb_information(
-        &self,
-        observed: &Points,
-        pose: &Pose,
-        limb: Limb,
-        interval_s: f64,
-    ) -> (LimbInformation, LimbVector) {
+    fn limb_information(&self, frame: &Frame, pose: &Pose, limb: Limb) -> (LimbInformation, LimbVector) {
         let i = limb.index();
         let trunk: &Matrix3<f64> = pose.trunk.matrix();
         let (sine, cosine) = pose.hinges[i].sin_cos();
@@ -242,13 +246,13 @@ impl StateSpace {
         let stretch = directions.map(|direction| trunk * direction);
         let mut information = LimbInformation::zeros();
         let mut gradient = LimbVector::zeros();
-        let mut slack = SMatrix::<f64, SLACKS, SLACKS>::from_diagonal(&self.slack_precision);
+        let mut slack = SMatrix::<f64, SLACKS, SLACKS>::from_diagonal(&self.slack_precision.unwrap_or_default());
         let mut slack_gradient = SVector::<f64, SLACKS>::zeros();
         let mut cross = SMatrix::<f64, LIMB_DIMENSION, SLACKS>::zeros();
         for (level, reach) in reach.into_iter().enumerate() {
             let p = point_index(limb, level);
             let point = root + trunk * reach;
-            let residual = observed[p] - point;
+            let residual = frame.points[p] - point;
             if !residual.x.is_finite() {
                 continue;
             }
@@ -260,25 +264,28 @@ impl StateSpace {
             if level == 2 {
                 jacobian.fixed_columns_mut::<1>(6).copy_from(&(trunk * swing));
             }
-            let mut by_slack = SMatrix::<f64, 3, SLACKS>::identity();
-            for (segment, direction) in stretch.iter().enumerate().take(level) {
-                by_slack.set_column(3 + segment, direction);
-            }
             let precision = self.precision[p] * self.weight(p, &residual);
             let weighted = scaled_rows(&jacobian, &precision).transpose();
             information += weighted * jacobian;
             gradient += weighted * residual;
+            if self.slack_precision.is_none() {
+                continue;
+            }
+            let mut by_slack = SMatrix::<f64, 3, SLACKS>::identity();
+            for (segment, direction) in stretch.iter().enumerate().take(level) {
+                by_slack.set_column(3 + segment, direction);
+            }
             cross += weighted * by_slack;
             let weighted = scaled_rows(&by_slack, &precision).transpose();
             slack += weighted * by_slack;
             slack_gradient += weighted * residual;
         }
-        // The slacks' prior makes their block positive definite.
-        if let Some(factor) = slack.cholesky() {
+        // The slacks' prior makes their block positive definite; without slacks there is nothing to marginalise.
+        if let Some(factor) = self.slack_precision.and_then(|_| slack.cholesky()) {
             information -= cross * factor.solve(&cross.transpose());
             gradient -= cross * factor.solve(&slack_gradient);
         }
-        self.add_twist_prior(pose, limb, interval_s, &mut information, &mut gradient);
+        self.add_twist_prior(pose, limb, frame.interval_s, &mut information, &mut gradient);
         (information, gradient)
     }
 
@@ -293,10 +300,8 @@ impl StateSpace {
         gradient: &mut LimbVector,
     ) {
         let axis = pose.limbs[limb.index()] * limb.reference_direction();
-        let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.limbs[limb.index()]);
-        let twist = 2.0 * quaternion.imag().dot(&limb.reference_direction()).atan2(quaternion.w);
-        let twist = twist - std::f64::consts::TAU * (twist / std::f64::consts::TAU).round();
-        let precision = interval_s / (self.tuning.twist_time_s * self.tuning.twist_sd.powi(2));
+        let twist = twist_of(pose, limb);
+        let precision = self.twist_precision(interval_s);
         for row in 0..3 {
             gradient[3 + row] -= precision * twist * axis[row];
             for column in 0..3 {
@@ -306,78 +311,75 @@ impl StateSpace {
     }
 }
 
+/// Least time that the twist prior of a frame counts for, seconds: the first frame has no interval.
+const LEAST_TWIST_INTERVAL_S: f64 = 1e-3;
+
+/// Rows of [`StateSpace::whitened_residuals`]: three for each point, one for each limb's twist.
+pub const RESIDUAL_DIMENSION: usize = OBSERVATION_DIMENSION + 4;
+
+/// Residuals in standard deviations, points first, then twists.
+pub type Residuals = SVector<f64, RESIDUAL_DIMENSION>;
+
+/// Twist of a limb about its own axis, radians, −π to π.
+fn twist_of(pose: &Pose, limb: Limb) -> f64 {
+    let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&pose.limbs[limb.index()]);
+    let twist = 2.0 * quaternion.imag().dot(&limb.reference_direction()).atan2(quaternion.w);
+    twist - std::f64::consts::TAU * (twist / std::f64::consts::TAU).round()
+}
+
+/// The model for methods that look at the observation itself instead of its derivative. Slacks are no part of it: it is
+/// for [`Tuning::rigid`].
+impl StateSpace {
+    /// What a frame differs from a posture, each row over its standard deviation; 0 for points not seen.
+    pub fn whitened_residuals(&self, frame: &Frame, pose: &Pose) -> Residuals {
+        let points = forward_kinematics(&self.skeleton, pose);
+        let mut residuals = Residuals::zeros();
+        for (p, point) in points.iter().enumerate() {
+            let residual = frame.points[p] - point;
+            if residual.x.is_finite() {
+                let whitened = residual.component_mul(&self.precision[p].map(f64::sqrt));
+                residuals.fixed_rows_mut::<3>(3 * p).copy_from(&whitened);
+            }
+        }
+        let twist_precision = self.twist_precision(frame.interval_s);
+        for limb in Limb::ALL {
+            residuals[OBSERVATION_DIMENSION + limb.index()] = -twist_of(pose, limb) * twist_precision.sqrt();
+        }
+        residuals
+    }
+
+    /// Student-t weight of each row from the expected squares of all: one for a point, 1 for a twist.
+    pub fn row_weights(&self, squares: &Residuals) -> Residuals {
+        let dof = self.tuning.student_t_dof;
+        Residuals::from_fn(|row, _| {
+            if row >= OBSERVATION_DIMENSION {
+                return 1.0;
+            }
+            let distance = squares.fixed_rows::<3>(3 * (row / 3)).sum();
+            (dof + 3.0) / (dof + distance)
+        })
+    }
+
+    /// Log-likelihood of a frame at a posture, up to a constant of the frame: a trivariate Student-t distribution for each
+    /// point, the twist prior for each limb. Its slope is the gradient of [`RateModel::information`].
+    pub fn log_likelihood(&self, frame: &Frame, pose: &Pose) -> f64 {
+        let residuals = self.whitened_residuals(frame, pose);
+        let dof = self.tuning.student_t_dof;
+        let of_point = |p: usize| (residuals.fixed_rows::<3>(3 * p).norm_squared() / dof).ln_1p();
+        let points: f64 = (0..POINT_COUNT).map(of_point).sum();
+        -0.5 * ((dof + 3.0) * points + residuals.fixed_rows::<4>(OBSERVATION_DIMENSION).norm_squared())
+    }
+
+    /// Precision of the twist prior in a frame, rad⁻².
+    fn twist_precision(&self, interval_s: f64) -> f64 {
+        interval_s.max(LEAST_TWIST_INTERVAL_S) / (self.tuning.twist_time_s * self.tuning.twist_sd.powi(2))
+    }
+}
+
 /// A matrix with each row multiplied by the factor of its axis.
 fn scaled_rows<const N: usize>(matrix: &SMatrix<f64, 3, N>, factors: &Vector3<f64>) -> SMatrix<f64, 3, N> {
     SMatrix::from_fn(|row, column| matrix[(row, column)] * factors[row])
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::DMatrix;
-
-    /// The covariance of a limb's three points as it is written in the module's documentation.
-    fn limb_covariance(model: &StateSpace, pose: &Pose, limb: Limb, observed: &Points) -> DMatrix<f64> {
-        let points = forward_kinematics(&model.skeleton, pose);
-        let at = |level| points[point_index(limb, level)];
-        let direction = |level| (at(level) - at(level - 1)).normalize();
-        DMatrix::from_fn(9, 9, |row, column| {
-            let ((a, i), (b, j)) = ((row / 3, row % 3), (column / 3, column % 3));
-            let mut covariance = if i == j { 1.0 / model.slack_precision[0] } else { 0.0 };
-            for segment in 1..=a.min(b) {
-                covariance += direction(segment)[i] * direction(segment)[j] / model.slack_precision[2 + segment];
-            }
-            if row == column {
-                let p = point_index(limb, a);
-                covariance += 1.0 / (model.precision[p][i] * model.weight(p, &(observed[p] - points[p])));
-            }
-            covariance
-        })
-    }
-
-    #[test]
-    fn the_information_is_that_of_the_full_covariance_of_each_limb() {
-        let skeleton = Skeleton::of_stature(1.7);
-        let truth = Pose::from_vector(&PoseVector::from_fn(|i, _| 0.1 * (i as f64).sin() + 0.2));
-        let mut observed = forward_kinematics(&skeleton, &truth);
-        for (p, point) in observed.iter_mut().enumerate() {
-            *point += Vector3::new(0.01, -0.02, 0.015) * (p as f64).cos();
-        }
-        let noise = SensorNoise { white: [Vector3::new(0.01, 0.02, 0.03); POINT_COUNT], slow_offset: 0.04 };
-        let model = StateSpace::new(&skeleton, &noise, &Tuning { twist_sd: 1e6, ..Tuning::default() });
-        let (_, jacobian) = forward_kinematics_with_jacobian(&skeleton, &truth);
-        let points = forward_kinematics(&skeleton, &truth);
-        let (information, gradient) = model.information(&observed, 0.0, &truth);
-        let (mut expected, mut expected_gradient) = (PoseCovariance::zeros(), PoseVector::zeros());
-        for limb in Limb::ALL {
-            let inverse = limb_covariance(&model, &truth, limb, &observed).try_inverse().expect("positive definite");
-            let rows = jacobian.fixed_rows::<9>(9 * limb.index()).into_owned();
-            let residual = SVector::<f64, 9>::from_fn(|row, _| {
-                let p = 3 * limb.index() + row / 3;
-                (observed[p] - points[p])[row % 3]
-            });
-            expected += rows.transpose() * &inverse * rows;
-            expected_gradient += rows.transpose() * &inverse * residual;
-        }
-        let scale = expected.amax();
-        assert!((information - expected).amax() < 1e-9 * scale, "{}", (information - expected).amax() / scale);
-        assert!((gradient - expected_gradient).amax() < 1e-9 * expected_gradient.amax());
-    }
-
-    #[test]
-    fn a_knee_near_its_limit_is_the_mean_of_what_the_range_of_motion_leaves() {
-        let skeleton = Skeleton::of_stature(1.7);
-        let noise = SensorNoise { white: [Vector3::repeat(0.01); POINT_COUNT], slow_offset: 0.0 };
-        let model = StateSpace::new(&skeleton, &noise, &Tuning::default());
-        let at = |degrees: f64| {
-            let mut pose = Pose::reference();
-            pose.hinges[2] = degrees.to_radians();
-            let observed = forward_kinematics(&skeleton, &pose);
-            let covariance = PoseCovariance::identity() * 5f64.to_radians().powi(2);
-            model.posterior(&observed, pose, &covariance).pose.hinges[2].to_degrees()
-        };
-        assert!((at(40.0) - 40.0).abs() < 1e-9, "far from the limit nothing changes");
-        // At the limit of −10° half of a normal distribution is left, whose mean is √(2/π) of its SD.
-        assert!((at(-10.0) - (-10.0 + 5.0 * 0.79788)).abs() < 1e-3, "{}", at(-10.0));
-    }
-}
+mod tests;
