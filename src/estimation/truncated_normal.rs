@@ -34,12 +34,12 @@ mod tests {
 
     #[test]
     fn the_mean_agrees_with_numerical_integration() {
-        let (mean, sd, low, high) = (-0.5, 0.8, -0.3, 1.1);
+        let (mean, sd, low, high) = (-0.5, 0.8_f64, -0.3, 1.1);
         let (mut mass, mut moment) = (0.0, 0.0);
         let n = 100_000;
         for i in 0..n {
             let x = low + (high - low) * (f64::from(i) + 0.5) / f64::from(n);
-            let density = (-0.5 * ((x - mean) / sd as f64).powi(2)).exp();
+            let density = (-0.5 * ((x - mean) / sd).powi(2)).exp();
             mass += density;
             moment += density * x;
         }

@@ -25,18 +25,18 @@ fn simulated(exercise: Exercise, sensor: Preset, seed: u64) -> SkeletonRecording
         yaw_deg: -10.0 + 5.0 * seed as f64,
         ..SimulationSettings::new(exercise, sensor, seed)
     };
-    simulate(&settings).unwrap().recording.skeleton.unwrap()
+    simulate(&settings).expect("valid settings").recording.skeleton.expect("a skeleton")
 }
 
 fn inspection(skeleton: &SkeletonRecording) -> Inspection {
     let settings = JointAngleSettings::default();
-    let observations = Observations::from_recording(skeleton, &settings).unwrap();
-    inspect(skeleton, &observations, &settings).unwrap()
+    let observations = Observations::from_recording(skeleton, &settings).expect("the joints of the model");
+    inspect(skeleton, &observations, &settings).expect("the joints of the model")
 }
 
 fn column(skeleton: &SkeletonRecording, limb: Limb, level: usize) -> usize {
     let (joint, stand_in) = limb.joints()[level];
-    skeleton.column(joint).or_else(|| skeleton.column(stand_in)).unwrap()
+    skeleton.column(joint).or_else(|| skeleton.column(stand_in)).expect("a joint of the sensor")
 }
 
 /// Points of each frame for which something holds.
@@ -101,7 +101,7 @@ fn recall_and_precision(sensor: Preset) -> BTreeMap<&'static str, Counts> {
                 add("hand_jump", with_arms_back(jumps[t] & seen[t], swaps[t]), rejected);
             }
             let lost: u64 = seen.iter().map(|mask| u64::from(12 - mask.count_ones())).sum();
-            let told = found.counts.iter().find(|c| c.kind == "lost_joint").unwrap().n_frames;
+            let told = found.counts.iter().find(|c| c.kind == "lost_joint").expect("every kind is counted").n_frames;
             let total = counts.entry("lost_joint").or_default();
             *total = [total[0] + lost, total[1] + told, total[2] + lost.min(told)];
         }

@@ -1,6 +1,7 @@
 //! Whole pipelines on recordings with known truth.
 
 mod events;
+mod live;
 mod model_methods;
 mod support;
 mod training;

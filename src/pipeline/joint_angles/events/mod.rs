@@ -1,7 +1,7 @@
 //! What went wrong while a recording was taken: found, undone or removed where that is certain, and told.
 //!
 //! Each kind of event is a file of its own with one function that looks at the [`Scene`], repairs it and says what it
-//! found. They run in the order of [`KINDS`], so that a later one sees what an earlier one repaired: exchanged limbs
+//! found. They run in the order of `KINDS`, so that a later one sees what an earlier one repaired: exchanged limbs
 //! are exchanged back before a hand is suspected to have jumped.
 //!
 //! Thresholds come from what bodies can do, or from the recording's own white noise; none belongs to a data set.

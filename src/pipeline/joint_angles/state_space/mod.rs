@@ -74,7 +74,7 @@ impl Default for Tuning {
             root_slack: 0.25,
             length_slack: 0.5,
             student_t_dof: 6.0,
-            twist_sd: 6f64.to_radians(),
+            twist_sd: 5f64.to_radians(),
             twist_time_s: 1.0 / 30.0,
             trunk_density: 3.0,
             limb_density: 6.0,
@@ -161,7 +161,7 @@ impl StateSpace {
             });
             if is_outlier { FLAG_OUTLIER } else { 0 }
         });
-        let offset = self.offset_covariance(observed, &pose);
+        let offset = self.offset_covariance(&pose);
         for limb in Limb::ALL {
             let hinge = hinge_offset(limb.index());
             let sd = covariance[(hinge, hinge)].max(0.0).sqrt();
@@ -178,17 +178,14 @@ impl StateSpace {
     }
 
     /// What an offset of the sensor that outlasts the smoothing does to a posture, rad²: the covariance of one frame's
-    /// estimate from points that are each off by the slow offset, with the twist prior.
-    fn offset_covariance(&self, observed: &Points, pose: &Pose) -> PoseCovariance {
+    /// estimate from points that are each off by the slow offset, with the twist prior. A point that is not seen in this
+    /// frame counts too: the offset it was last seen with is still in the estimate, and what its absence adds is in the
+    /// covariance of the passes.
+    fn offset_covariance(&self, pose: &Pose) -> PoseCovariance {
         let (_, jacobian) = forward_kinematics_with_jacobian(&self.skeleton, pose);
-        let seen = seen_mask(observed);
-        // A joint that is not seen is known to this at most; it also keeps the matrix invertible.
+        // No rotation is known worse than this; it also keeps the matrix invertible.
         let mut information = PoseCovariance::identity() / UNSEEN_SD.powi(2);
-        let precision = self.slow_offset.powi(-2);
-        for p in (0..POINT_COUNT).filter(|p| seen >> p & 1 == 1) {
-            let rows = jacobian.fixed_rows::<3>(3 * p);
-            information.gemm_tr(precision, &rows, &rows, 1.0);
-        }
+        information.gemm_tr(self.slow_offset.powi(-2), &jacobian, &jacobian, 1.0);
         for limb in Limb::ALL {
             let axis = pose.limbs[limb.index()] * limb.reference_direction() / self.tuning.twist_sd;
             let a = attitude_offset(limb.index());
