@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn table_2_holds_every_method_and_every_number_of_particles_once() {
+    fn table_2_holds_every_method_once_and_the_papers_filter_with_every_number_of_particles() {
         let contenders = Contender::table2(&PAPER_PARTICLES);
         assert_eq!(contenders.iter().collect::<HashSet<_>>().len(), contenders.len());
         for method in Method::ALL {
@@ -241,7 +241,11 @@ mod tests {
                     _ => None,
                 })
                 .collect();
-            let expected = if method.has_particles() { PAPER_PARTICLES.map(Some).to_vec() } else { vec![None] };
+            let expected = match method {
+                Method::Particle => PAPER_PARTICLES.map(Some).to_vec(),
+                Method::Guided => vec![Some(96)],
+                _ => vec![None],
+            };
             assert_eq!(counts, expected, "{method}");
         }
         assert!(contenders.contains(&"iekf-filter".parse().unwrap()) && contenders.contains(&Contender::Raw));
