@@ -1,5 +1,6 @@
 //! Whole pipelines on recordings with known truth.
 
+mod body;
 mod events;
 mod support;
 mod training;
