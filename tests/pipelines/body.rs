@@ -20,7 +20,7 @@ fn unknown(exercise: Exercise, preset: Preset, seed: u64) -> Recording {
         duration_s: 20.0,
         ..SimulationSettings::new(exercise, preset, seed)
     };
-    let mut recording = simulate(&settings).unwrap().recording;
+    let mut recording = simulate(&settings).expect("settings in range").recording;
     recording.header.subject_height_m = None;
     recording
 }
@@ -40,7 +40,7 @@ fn with_stature(mut recording: Recording) -> Recording {
 }
 
 fn assessed(recording: &Recording) -> Assessment {
-    assess(recording, &Settings::default(), &Monitor::default()).unwrap()
+    assess(recording, &Settings::default(), &Monitor::default()).expect("an assessment")
 }
 
 fn codes(found: &Assessment) -> Vec<&str> {
@@ -48,7 +48,7 @@ fn codes(found: &Assessment) -> Vec<&str> {
 }
 
 fn lengths(found: &Assessment) -> Vec<f64> {
-    found.quality.calibration.as_ref().unwrap().segments.iter().map(|segment| segment.length_m).collect()
+    found.quality.calibration.as_ref().expect("a calibration").segments.iter().map(|segment| segment.length_m).collect()
 }
 
 /// Root mean square difference from the true lengths, metres.
@@ -194,11 +194,11 @@ fn lengths_that_contradict_the_recording_and_differ_by_side_are_told() {
 fn patients(recording: &Recording, earlier: Option<&Assessment>, choice: CalibrationChoice) -> Assessment {
     let patient_calibration = earlier.map(|earlier| PatientCalibration {
         assessment_id: Uuid::from_u128(7),
-        quality: earlier.quality.calibration.clone().unwrap(),
+        quality: earlier.quality.calibration.clone().expect("a calibration"),
     });
     let settings = Settings::JointAngles(JointAngleSettings { calibration: choice, ..JointAngleSettings::default() });
     let inputs = Inputs { patient_calibration, ..Inputs::default() };
-    assess_with(recording, &settings, &inputs, &Monitor::default()).unwrap()
+    assess_with(recording, &settings, &inputs, &Monitor::default()).expect("an assessment")
 }
 
 #[test]
