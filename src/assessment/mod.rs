@@ -13,7 +13,7 @@ pub use noise_model::{NoiseModel, NoiseModelName, NoiseModelReference};
 pub use provenance::Provenance;
 pub use quality::{Event, Quality, Warning};
 pub use series::{ChannelSummary, Series};
-pub use settings::{JointAngleSettings, Method, NoiseModelSettings, Pass, Settings};
+pub use settings::{CalibrationChoice, JointAngleSettings, Method, NoiseModelSettings, Pass, Settings};
 
 /// One pipeline's result on one recording.
 #[derive(Debug, Clone, PartialEq)]

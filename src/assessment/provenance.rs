@@ -4,6 +4,7 @@ use super::noise_model::NoiseModelReference;
 use super::settings::Settings;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+use uuid::Uuid;
 
 /// Origin of an assessment. The same recording, version, settings and seed give the same bytes.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
@@ -19,6 +20,9 @@ pub struct Provenance {
     /// The noise model that the result rests on; null for a method that has none.
     #[serde(default)]
     pub noise_model: Option<NoiseModelReference>,
+    /// The assessment whose calibration the result also rests on, when the settings ask for the patient's.
+    #[serde(default)]
+    pub patient_assessment_id: Option<Uuid>,
     /// Seed of the random streams.
     pub seed: u64,
     /// SHA-256 of the uploaded bytes, lower-case hexadecimal; empty when the recording did not come from bytes.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+use uuid::Uuid;
 
 /// Quality block of an assessment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
@@ -52,7 +53,8 @@ impl EffectiveSampleSize {
 /// How segment lengths were found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CalibrationQuality {
-    /// `static_window` or `whole_recording`.
+    /// What the recording itself was measured in: `static_window`, `whole_recording`, or `incomplete_recording` when some
+    /// limb was hardly ever seen whole.
     pub source: String,
     /// First and last second of the static window, when there is one.
     pub window_s: Option<[f64; 2]>,
@@ -60,6 +62,29 @@ pub struct CalibrationQuality {
     pub n_frames: u64,
     /// Segment lengths.
     pub segments: Vec<SegmentLength>,
+    /// Root mean square of the segments' `measured_uncertainty_m`, metres; null when one of them was not measured.
+    #[serde(default)]
+    pub measured_uncertainty_m: Option<f64>,
+    /// Shoulders and hips in the trunk, as this recording alone shows them.
+    #[serde(default)]
+    pub measured_trunk_offsets: Vec<TrunkOffset>,
+    /// What was known beside the recording and used: `segment_lengths`, `patient`, `stature`; empty when nothing was.
+    #[serde(default)]
+    pub knowledge: Vec<String>,
+    /// The earlier assessment of the same patient whose calibration was used, when settings asked for it.
+    #[serde(default)]
+    pub patient_assessment_id: Option<Uuid>,
+}
+
+/// Where a shoulder or hip sits in the trunk.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TrunkOffset {
+    /// Joint, for example `left_hip`.
+    pub joint: String,
+    /// Position from the torso joint: forward, up, right; metres.
+    pub position_m: [f64; 3],
+    /// Standard deviation of each coordinate, metres.
+    pub uncertainty_m: f64,
 }
 
 /// Length of one body segment.
@@ -67,10 +92,19 @@ pub struct CalibrationQuality {
 pub struct SegmentLength {
     /// Segment, for example `left_thigh`.
     pub segment: String,
-    /// Robust mean length, metres.
+    /// Length that was used, metres: the recording's own measurement and all that is known beside it.
     pub length_m: f64,
-    /// Robust standard deviation over the frames used, metres.
-    pub spread_m: f64,
+    /// Standard deviation of the length that was used, metres.
+    #[serde(default)]
+    pub uncertainty_m: Option<f64>,
+    /// Robust standard deviation over the frames used, metres; null when the segment was seen in too few.
+    pub spread_m: Option<f64>,
+    /// Robust mean length in this recording alone, metres; null when the segment was seen in too few frames.
+    #[serde(default)]
+    pub measured_m: Option<f64>,
+    /// Standard deviation of `measured_m`, metres.
+    #[serde(default)]
+    pub measured_uncertainty_m: Option<f64>,
 }
 
 /// Something the reader should know.

@@ -72,6 +72,17 @@ impl Method {
     }
 }
 
+/// What segment lengths rest on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CalibrationChoice {
+    /// The recording and what its header says of the body.
+    #[default]
+    Recording,
+    /// Also the best calibration among the assessments of the patient's other recordings.
+    Patient,
+}
+
 /// Whether an estimate of a frame rests on the frames up to it or on the whole recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -158,11 +169,22 @@ pub struct JointAngleSettings {
     /// means the method's own choice: `nite-table1` for `particle`, `adaptive` for `iekf`, `ukf` and `guided`.
     #[schema(pattern = "^[a-z][a-z0-9-]{0,63}(@[1-9][0-9]{0,9})?$", example = "kinect-v2")]
     pub noise_model: Option<String>,
+    /// `recording`, or `patient`: segment lengths also from the patient's other recordings, of those assessed the newest
+    /// with a static window, or else the one with the least uncertainty. It is looked up when the job runs.
+    pub calibration: CalibrationChoice,
 }
 
 impl Default for JointAngleSettings {
     fn default() -> Self {
-        Self { method: Method::Iekf, pass: None, particles: None, seed: 1, min_confidence: 0.3, noise_model: None }
+        Self {
+            method: Method::Iekf,
+            pass: None,
+            particles: None,
+            seed: 1,
+            min_confidence: 0.3,
+            noise_model: None,
+            calibration: CalibrationChoice::Recording,
+        }
     }
 }
 

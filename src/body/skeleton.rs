@@ -2,12 +2,16 @@
 
 use super::joint::{Joint, Side};
 use nalgebra::Vector3;
+use std::ops::Range;
 
 /// Points that are observed, three for each limb.
 pub const POINT_COUNT: usize = 12;
 
 /// Length of the observation vector y: the coordinates of the observed points (\[angles\], y ∈ R³⁶).
 pub const OBSERVATION_DIMENSION: usize = 3 * POINT_COUNT;
+
+/// Segment lengths that a human body can have, metres; outside them the unit or the joints must be wrong.
+pub const PLAUSIBLE_SEGMENT_M: Range<f64> = 0.05..0.90;
 
 /// One limb; its number orders states and observations everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

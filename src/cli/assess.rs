@@ -65,7 +65,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         noise_model: args.noise_model.as_ref().map(NoiseModelChoice::name),
         ..JointAngleSettings::default()
     });
-    let inputs = Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model) };
+    let inputs =
+        Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model), ..Inputs::default() };
     let mut assessment = assess_with_progress(&recording, &settings, &inputs)?;
     assessment.provenance.recording_sha256 = hex::encode(Sha256::digest(&bytes));
     if let Some(path) = &args.csv {

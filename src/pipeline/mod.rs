@@ -2,9 +2,11 @@
 
 pub mod joint_angles;
 
+use crate::assessment::quality::CalibrationQuality;
 use crate::assessment::{Assessment, NoiseModel, Settings};
 use crate::progress::{Cancelled, Monitor};
 use crate::recording::Recording;
+use uuid::Uuid;
 
 /// Why a recording has no assessment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,6 +44,17 @@ impl From<Cancelled> for PipelineError {
 pub struct Inputs {
     /// The noise model that the settings name. Shipped models need not be given.
     pub noise_model: Option<NoiseModel>,
+    /// The calibration of another recording of the same patient; used when the settings ask for it.
+    pub patient_calibration: Option<PatientCalibration>,
+}
+
+/// How the body was measured in another recording of the same patient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PatientCalibration {
+    /// The assessment that it is of.
+    pub assessment_id: Uuid,
+    /// Lengths and offsets with their uncertainty.
+    pub quality: CalibrationQuality,
 }
 
 /// Runs the pipeline that the settings name, on what comes with the software. The recording's digest is added to the

@@ -5,6 +5,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions};
 use nalgebra::UnitQuaternion;
 use serde::Serialize;
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
@@ -179,6 +180,7 @@ fn header(recording: &Recording) -> Result<BTreeMap<String, String>, EncodeError
     let start_time = header.start_time.map(|time| time.format(&time::format_description::well_known::Rfc3339));
     let start_time =
         start_time.transpose().map_err(|_| EncodeError::Unsuitable("its start time has no RFC 3339 form"))?;
+    let segment_lengths = (!header.segment_lengths_m.is_empty()).then(|| json!(header.segment_lengths_m).to_string());
     let entries = [
         ("version", Some("1".to_owned())),
         ("handedness", Some("right".to_owned())),
@@ -188,6 +190,7 @@ fn header(recording: &Recording) -> Result<BTreeMap<String, String>, EncodeError
         ("device_model", header.device.model.clone()),
         ("device_middleware", header.device.middleware.clone()),
         ("subject_height_m", header.subject_height_m.map(|stature| stature.to_string())),
+        ("segment_lengths_m", segment_lengths),
         ("start_time", start_time),
     ];
     Ok(entries.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect())

@@ -15,6 +15,7 @@ pub use error::DecodeError;
 pub use skeleton::{ReferenceSeries, SkeletonRecording};
 
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// One decoded upload.
@@ -41,6 +42,10 @@ pub struct Header {
     /// The subject's stature in metres, 0.5 to 2.5.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subject_height_m: Option<f64>,
+    /// Lengths of the subject's limb segments as measured on the body, metres, 0.05 to 0.90; any of `left_upper_arm`,
+    /// `left_forearm`, `left_thigh`, `left_shank` and the same with `right_`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub segment_lengths_m: BTreeMap<String, f64>,
     /// Wall-clock time of time stamp zero, RFC 3339.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "time::serde::rfc3339::option")]
     #[schema(value_type = Option<String>, format = DateTime)]

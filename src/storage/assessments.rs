@@ -6,6 +6,7 @@ use super::series::{self, EncodedSeries};
 use super::{
     Access, AssessmentId, JobId, Page, PageRequest, PatientId, RecordingId, SessionId, StorageError, Store, row,
 };
+use crate::assessment::quality::CalibrationQuality;
 use crate::assessment::{Assessment, ChannelSummary, Provenance, Quality};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
@@ -220,6 +221,36 @@ impl Store {
             .await?;
         let assessments = rows.iter().map(assessment_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(assessments, page, |assessment| assessment.id))
+    }
+
+    /// The calibration of the best other recording of a job's patient: of those assessed the newest with a static window,
+    /// or else the one with the least uncertainty. For the worker, which serves every organisation; none outside the job's
+    /// own, and none of the job's recording, which would count itself twice.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn patient_calibration_of_job(
+        &self,
+        job: JobId,
+    ) -> Result<Option<(AssessmentId, CalibrationQuality)>, StorageError> {
+        let row = sqlx::query(
+            "SELECT a.id, a.quality -> '$.calibration' AS calibration,
+                    a.quality ->> '$.calibration.source' = 'static_window' AS is_static,
+                    a.quality ->> '$.calibration.measured_uncertainty_m' AS uncertainty
+             FROM jobs j
+                  JOIN recordings own ON own.id = j.recording_id
+                  JOIN sessions own_session ON own_session.id = own.session_id
+                  JOIN sessions s ON s.patient_id = own_session.patient_id
+                                 AND s.organisation_id = j.organisation_id
+                  JOIN recordings r ON r.session_id = s.id AND r.id <> own.id
+                  JOIN assessments a ON a.recording_id = r.id AND a.organisation_id = j.organisation_id
+             WHERE j.id = ?1 AND uncertainty IS NOT NULL
+             ORDER BY is_static DESC, CASE WHEN is_static THEN 0 ELSE uncertainty END, a.id DESC LIMIT 1",
+        )
+        .bind(job)
+        .fetch_optional(self.reader())
+        .await?;
+        row.map(|row| Ok((row.try_get("id")?, row::json(&row, "calibration")?))).transpose()
     }
 
     /// Names of the series of an assessment within the caller's reach.

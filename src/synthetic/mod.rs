@@ -24,6 +24,7 @@ use crate::body::{Joint, Pose};
 use crate::recording::{Device, Header, Recording, ReferenceSeries, SkeletonRecording};
 use nalgebra::{Rotation3, Vector3};
 use posture::Stance;
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 /// Name of the reference system on the truth's channels.
@@ -135,6 +136,7 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Simulation, SettingOutO
             middleware: Some(format!("surefoot-simulate {}", env!("CARGO_PKG_VERSION"))),
         },
         subject_height_m: Some(settings.stature_m),
+        segment_lengths_m: BTreeMap::new(),
         start_time: None,
     };
     let references = truth(&skeleton.time_ns, &poses, &thetas);

@@ -11,8 +11,8 @@ pub use assessing::{AttemptError, assess_recording};
 use assessing::{TrainingRecordings, train_noise_model};
 
 use crate::assessment::noise_model::find_shipped;
-use crate::assessment::{Assessment, JointAngleSettings, NoiseModel, NoiseModelSettings, Settings};
-use crate::pipeline::{Inputs, PipelineError};
+use crate::assessment::{Assessment, CalibrationChoice, JointAngleSettings, NoiseModel, NoiseModelSettings, Settings};
+use crate::pipeline::{Inputs, PatientCalibration, PipelineError};
 use crate::progress::{Monitor, Step};
 use crate::queue::{Failure, Finish, Job, JobError, Queue, Renewal, Trained};
 use crate::recording::decode::Limits;
@@ -197,19 +197,38 @@ impl Worker {
         Ok((reader, recording))
     }
 
-    /// The noise model that the settings name, when it does not come with the software.
+    /// What the settings name: a noise model that does not come with the software, the patient's calibration.
     async fn inputs(&self, job: &Job, settings: &JointAngleSettings) -> Result<Inputs, AttemptError> {
+        Ok(Inputs {
+            noise_model: self.named_noise_model(job, settings).await?,
+            patient_calibration: match settings.calibration {
+                CalibrationChoice::Recording => None,
+                CalibrationChoice::Patient => self.patient_calibration(job).await?,
+            },
+        })
+    }
+
+    async fn named_noise_model(
+        &self,
+        job: &Job,
+        settings: &JointAngleSettings,
+    ) -> Result<Option<NoiseModel>, AttemptError> {
         let unusable = |error: &dyn fmt::Display| PipelineError::unsuitable("unusable_noise_model", error.to_string());
         let name = settings.chosen_noise_model().map_err(|error| unusable(&error))?;
         let Some(name) = name.filter(|name| !name.is_adaptive() && find_shipped(name).is_none()) else {
-            return Ok(Inputs::default());
+            return Ok(None);
         };
         match self.queue.store().noise_model_of_job(job.id, &name).await {
-            Ok(model) => Ok(Inputs { noise_model: Some(model) }),
+            Ok(model) => Ok(Some(model)),
             // The pipeline says which model is missing.
-            Err(StorageError::NotFound { .. }) => Ok(Inputs::default()),
+            Err(StorageError::NotFound { .. }) => Ok(None),
             Err(error) => Err(error.into()),
         }
+    }
+
+    async fn patient_calibration(&self, job: &Job) -> Result<Option<PatientCalibration>, AttemptError> {
+        let found = self.queue.store().patient_calibration_of_job(job.id).await?;
+        Ok(found.map(|(id, quality)| PatientCalibration { assessment_id: id.into(), quality }))
     }
 
     /// Waits for the computation, renews the lease, and passes on the request to stop.

@@ -9,6 +9,7 @@ mod events;
 mod health;
 mod jobs;
 mod noise_models;
+mod patient_calibration;
 mod patients;
 mod problems;
 mod recordings;

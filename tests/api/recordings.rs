@@ -162,7 +162,7 @@ async fn a_recording_is_assessed_again_with_other_settings() {
     let answer = app.post(&path).json(&settings).send().await;
     let job = answer.expect(StatusCode::ACCEPTED);
     let filled = json!({"pipeline": "joint_angles", "method": "particle", "pass": null, "particles": 128, "min_confidence": 0.5, "seed": 1,
-                         "noise_model": null});
+                         "noise_model": null, "calibration": "recording"});
     assert_eq!(job["settings"], filled);
     assert_eq!(answer.header("location"), format!("/v1/jobs/{}", text(&job["id"])));
     app.run_pending_jobs().await;

@@ -1,5 +1,6 @@
 //! Whole pipelines on recordings with known truth.
 
+mod body;
 mod events;
 mod live;
 mod model_methods;

@@ -172,7 +172,7 @@ fn a_trained_model_changes_the_estimate_and_one_that_is_not_given_is_missed() {
     let recording = exercise(Exercise::BackKnee, Preset::Table1, 20.0);
     let model = trained(&[standing(10, 1), standing(10, 2)], std::slice::from_ref(&recording)).unwrap();
     let wanted = settings(Method::Iekf, Some("ward-3@1"));
-    let inputs = Inputs { noise_model: Some(model.clone()) };
+    let inputs = Inputs { noise_model: Some(model.clone()), ..Inputs::default() };
     let found = assess_with(&recording, &wanted, &inputs, &Monitor::default()).unwrap();
     assert_eq!(found.provenance.noise_model, Some(model.reference()));
     let adaptive = assess(&recording, &settings(Method::Iekf, None), &Monitor::default()).unwrap();

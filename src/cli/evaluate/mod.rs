@@ -195,7 +195,10 @@ fn plan(args: &JointAngleArgs) -> anyhow::Result<Plan> {
         seeds: args.seeds.unwrap_or(if args.table2 { 6 } else { 3 }),
         contenders,
         settings,
-        inputs: Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model) },
+        inputs: Inputs {
+            noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model),
+            ..Inputs::default()
+        },
     })
 }
 

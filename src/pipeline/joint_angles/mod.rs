@@ -4,11 +4,14 @@
 //! (lengths, offsets, facing) → the chosen method's posterior
 //! of the posture in every frame → anatomical angles with intervals and flags.
 
+mod body_fusion;
+pub mod body_knowledge;
 pub mod calibration;
 pub mod events;
 pub mod guided;
 pub mod iekf;
 pub mod inverse_kinematics;
+pub mod length_uncertainty;
 mod likelihood_kernel;
 pub mod live;
 pub mod middleware;
@@ -31,7 +34,8 @@ use crate::assessment::{
 use crate::body::Pose;
 use crate::progress::{Monitor, Step};
 use crate::recording::Recording;
-use calibration::{Calibration, calibrate};
+use body_knowledge::BodyKnowledge;
+use calibration::{Calibration, calibrate_with};
 use events::{Inspection, Repairs, inspect};
 use guided::Sampling;
 use noise_model::NoiseModel;
@@ -82,7 +86,8 @@ pub fn assess_with(
     // The middleware's rotations cannot be repaired: `nite` shows them as they are.
     let (mut observations, repairs) =
         if settings.method == Method::Nite { (recorded, Repairs::default()) } else { (repaired, repairs) };
-    let calibration = calibrate(&mut observations)?;
+    let knowledge = BodyKnowledge::of(&recording.header, settings, inputs);
+    let calibration = calibrate_with(&mut observations, &knowledge)?;
     let mut quality = observations_quality(&observations, &calibration);
     (quality.events, quality.event_counts) = (events, counts);
     let mut builder = SeriesBuilder::new(observations.len(), repairs);
@@ -135,6 +140,7 @@ pub fn assess_with(
             method: settings.method.name().to_owned(),
             settings: Settings::JointAngles(settings.clone()),
             noise_model: noise.reference(),
+            patient_assessment_id: knowledge.patient().map(|patient| patient.assessment_id),
             seed: settings.seed,
             recording_sha256: String::new(),
         },

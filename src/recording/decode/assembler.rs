@@ -1,6 +1,6 @@
 //! Values in, recording out: everything that both formats check, one frame at a time.
 
-use super::checks::{MAX_TEXT, check_counts, checked_sample};
+use super::checks::{MAX_TEXT, check_counts, check_segment_lengths, checked_sample};
 use super::limits::{Format, Limits};
 use super::message::{FrameMessage, List};
 use super::{IgnoredChannel, Inspection};
@@ -85,6 +85,10 @@ impl Assembler {
             let sentence = format!("the subject's height is {stature}, expected metres between 0.5 and 2.5");
             return Err(DecodeError::new("invalid_value", sentence).at(format!("{place}.subject_height_m")));
         }
+        check_segment_lengths(&header.segment_lengths_m).map_err(|(name, sentence)| {
+            let shown: String = name.chars().take(MAX_TEXT).collect();
+            DecodeError::new("invalid_value", sentence).at(format!("{place}.segment_lengths_m.{shown}"))
+        })?;
         self.header = Some((header, coordinates));
         Ok(())
     }

@@ -1,10 +1,13 @@
 //! What each value of a frame, and each declaration, must be.
 
 use super::message::{FrameMessage, Numbers};
-use crate::body::Joint;
+use crate::body::skeleton::PLAUSIBLE_SEGMENT_M;
+use crate::body::{Joint, Limb};
 use crate::recording::DecodeError;
 use crate::recording::coordinates::{Coordinates, Handedness, Up};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Longest accepted free text, characters.
 pub(super) const MAX_TEXT: usize = 64;
@@ -131,4 +134,19 @@ pub(super) fn coordinates_from_names(
         return refuse("length_unit", length_unit, "`m`: convert the positions to metres");
     }
     Ok(Coordinates { handedness, up })
+}
+
+/// The first segment whose name is none or whose length no human one has, and what is wrong with it.
+pub(super) fn check_segment_lengths(lengths: &BTreeMap<String, f64>) -> Result<(), (&str, String)> {
+    for (name, length_m) in lengths {
+        let names: Vec<String> = Limb::ALL.into_iter().flat_map(Limb::segment_names).collect();
+        if !names.contains(name) {
+            return Err((name, format!("this is no segment; there are {}", names.join(", "))));
+        }
+        if !PLAUSIBLE_SEGMENT_M.contains(length_m) {
+            let Range { start, end } = PLAUSIBLE_SEGMENT_M;
+            return Err((name, format!("the length is {length_m}, expected metres from {start} to {end}")));
+        }
+    }
+    Ok(())
 }

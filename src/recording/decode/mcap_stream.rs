@@ -352,6 +352,11 @@ fn metadata(data: &[u8], assembler: &mut Assembler) -> Result<(), DecodeError> {
         protocol: text("protocol"),
         device: Device { model: text("device_model"), middleware: text("device_middleware") },
         subject_height_m,
+        segment_lengths_m: map
+            .get("segment_lengths_m")
+            .map(|text| segment_lengths(text))
+            .transpose()?
+            .unwrap_or_default(),
         start_time,
     };
     assembler.declare(header, coordinates, "header")
@@ -361,6 +366,14 @@ fn stature(text: &str) -> Result<f64, DecodeError> {
     text.parse().map_err(|_| {
         let sentence = "`subject_height_m` is not a number; write metres, for example `1.75`";
         DecodeError::new("invalid_value", sentence).at("header.subject_height_m")
+    })
+}
+
+fn segment_lengths(text: &str) -> Result<BTreeMap<String, f64>, DecodeError> {
+    serde_json::from_str(text).map_err(|_| {
+        let sentence =
+            "`segment_lengths_m` is no JSON object of numbers; write metres, for example `{\"left_thigh\": 0.42}`";
+        DecodeError::new("invalid_value", sentence).at("header.segment_lengths_m")
     })
 }
 

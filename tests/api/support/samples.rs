@@ -94,6 +94,7 @@ pub fn known_result() -> Arc<Assess> {
                 pipeline: "joint_angles".into(),
                 method: method_of(settings),
                 settings: settings.clone(),
+                patient_assessment_id: None,
                 noise_model: Some(NoiseModelReference::adaptive()),
                 seed: 1,
                 recording_sha256: String::new(),

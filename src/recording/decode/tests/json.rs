@@ -39,6 +39,12 @@ fn every_defect_of_a_document_has_its_code_and_its_place() {
         changed(|d| d["header"]["subject_height_m"] = json!(175)),
         expected("invalid_value", "header.subject_height_m")
     );
+    for (name, length_m) in [("left_tigh", 0.4), ("left_thigh", 0.9), ("left_thigh", 42.0), ("left_thigh", 0.04)] {
+        assert_eq!(
+            changed(|d| d["header"]["segment_lengths_m"] = json!({"right_shank": 0.4, name: length_m})),
+            expected("invalid_value", &format!("header.segment_lengths_m.{name}"))
+        );
+    }
     assert_eq!(
         changed(|d| d["header"]["start_time"] = json!("yesterday")),
         expected("invalid_value", "header.start_time")

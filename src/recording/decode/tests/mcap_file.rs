@@ -96,6 +96,9 @@ fn every_defect_of_a_header_has_its_code() {
     assert_eq!(with("length_unit", "mm").0, "invalid_value");
     assert_eq!(with("subject_height_m", "tall").0, "invalid_value");
     assert_eq!(with("subject_height_m", "NaN").0, "invalid_value");
+    assert_eq!(with("segment_lengths_m", "0.4"), ("invalid_value", "header.segment_lengths_m".into()));
+    let unknown = ("invalid_value", "header.segment_lengths_m.left_tigh".into());
+    assert_eq!(with("segment_lengths_m", r#"{"left_tigh": 0.4}"#), unknown);
     assert_eq!(with("start_time", "noon").0, "invalid_value");
     assert_eq!(with("protocol", &"x".repeat(65)).0, "invalid_value");
     assert_eq!(

@@ -32,13 +32,17 @@ fn reference() -> impl Strategy<Value = ReferenceSeries> {
 }
 
 fn header() -> impl Strategy<Value = Header> {
-    (prop::option::of("[a-zäö \"=,]{0,64}"), prop::option::of(0.5..=2.5f64), prop::option::of(0..4_000_000_000i64))
-        .prop_map(|(protocol, subject_height_m, start)| Header {
+    let segments = prop::collection::btree_map("(left|right)_(upper_arm|forearm|thigh|shank)", 0.05..0.9f64, 0..4);
+    let protocol = prop::option::of("[a-zäö \"=,]{0,64}");
+    (protocol, prop::option::of(0.5..=2.5f64), segments, prop::option::of(0..4_000_000_000i64)).prop_map(
+        |(protocol, subject_height_m, segment_lengths_m, start)| Header {
             protocol,
             device: Device { model: Some("kinect-v2".into()), middleware: None },
             subject_height_m,
+            segment_lengths_m,
             start_time: start.map(|s| time::OffsetDateTime::from_unix_timestamp(s).expect("in range")),
-        })
+        },
+    )
 }
 
 use crate::recording::Device;
