@@ -322,6 +322,7 @@ impl Assembler {
         let recording = self.keep.then(|| Recording {
             header,
             skeleton: Some(self.skeleton),
+            inertial: None,
             references: self.references.into_iter().map(|known| known.series).collect(),
         });
         Ok(Assembled { inspection, recording })

@@ -141,7 +141,10 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         device: Device { model: Some("kinect-v1".into()), middleware: Some("kinect-sdk-1".into()) },
         ..Header::default()
     };
-    Ok(Trial { recording: Recording { header, skeleton: Some(skeleton), references: vec![reference] }, notes })
+    Ok(Trial {
+        recording: Recording { header, skeleton: Some(skeleton), inertial: None, references: vec![reference] },
+        notes,
+    })
 }
 
 /// Angle between gravity at the start and gravity at each sample, in the sensor, degrees.

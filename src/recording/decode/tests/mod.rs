@@ -27,6 +27,7 @@ fn example() -> Recording {
     Recording {
         header: Header { protocol: Some("squat".into()), subject_height_m: Some(1.75), ..Header::default() },
         skeleton: Some(skeleton),
+        inertial: None,
         references: vec![ReferenceSeries {
             channel: "right_knee_flexion_deg".into(),
             source: "goniometer".into(),

@@ -67,7 +67,12 @@ fn recording() -> impl Strategy<Value = Recording> {
                 if !with_orientations || skeleton.orientations.iter().all(Option::is_none) {
                     skeleton.orientations.clear();
                 }
-                Recording { header, skeleton: Some(skeleton), references: reference.into_iter().collect() }
+                Recording {
+                    header,
+                    skeleton: Some(skeleton),
+                    inertial: None,
+                    references: reference.into_iter().collect(),
+                }
             },
         )
     })
