@@ -9,6 +9,7 @@ pub mod encode;
 pub mod error;
 pub mod import;
 pub mod inertial;
+pub mod inertial_quality;
 pub mod skeleton;
 
 pub use decode::{Format, Inspection, Inspector, Limits, decode};
