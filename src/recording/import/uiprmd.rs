@@ -144,6 +144,7 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         references: references.iter().map(|reference| reference.channel.clone()).collect(),
         clock_offset,
         defects,
+        inertial: Vec::new(),
         remarks,
     };
     let header = Header {
