@@ -246,11 +246,10 @@ fn wrong_unit(wrong: WrongUnit, segment: Segment, number: usize) -> DecodeError 
             );
             DecodeError::new("acceleration_unit", sentence).at(format!("inertial[{number}].acceleration"))
         }
-        WrongUnit::AngularRate(factor) => {
+        WrongUnit::AngularRateInDegrees => {
             let sentence = format!(
-                "the gyroscope of the unit on `{segment}` turns {:.0} times as fast as gravity does in its \
-                 accelerometer: is it in degrees per second? Multiply by π/180",
-                1.0 / factor
+                "the gyroscope of the unit on `{segment}` turns gravity as its accelerometer sees it turn only when its \
+                 numbers are degrees per second; send rad/s: multiply by π/180"
             );
             DecodeError::new("angular_rate_unit", sentence).at(format!("inertial[{number}].angular_rate"))
         }

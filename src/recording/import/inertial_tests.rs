@@ -83,6 +83,8 @@ fn every_inertial_trial_imports_in_si_without_a_unit_that_is_refused() {
             assert_eq!(sensors(trial).len(), n_units, "{}", trial.notes.name);
             for (unit, notes) in sensors(trial).iter().zip(&trial.notes.inertial) {
                 println!("{} {} {:?}", trial.notes.name, unit.segment, notes.warnings);
+                let is_turned = notes.warnings.iter().any(|warning| warning.contains("wrong way"));
+                assert!(!is_turned, "{} {}: a sound unit is doubted", trial.notes.name, unit.segment);
                 assert!((notes.rate_hz / rate_hz - 1.0).abs() < 1e-3, "{}: {}", trial.notes.name, notes.rate_hz);
                 let mut magnitudes: Vec<f64> = unit.acceleration.iter().map(Vector3::norm).collect();
                 magnitudes.sort_by(f64::total_cmp);

@@ -1,190 +1,221 @@
 //! Do accelerometer and gyroscope of one unit agree on how gravity turns in the unit?
 //!
-//! While a unit moves gently, its accelerometer shows the upward direction `u`, and the gyroscope says how that turns:
-//! `du/dt = u × ω`. Means over windows of 0.1 s give differences Δu; least squares then give one factor for all axes
-//! (k) and one for each axis of the gyroscope (s):
-//!
-//! ```text
-//! Δu ≈ k (ū × ω̄) T          Δu ≈ Σ sᵢ ω̄ᵢ (ū × eᵢ) T
-//! ```
-//!
-//! A sound unit has factors near 1; rates in degrees have k = π/180; a mirrored axis has sᵢ near −1, and a left-handed
-//! unit has it on all three. Sums only, so a stream needs constant memory.
+//! Where the accelerometer reads gravity alone for 0.1 s, it shows the upward direction `u`. Between two such instants the
+//! gyroscope is integrated once as it is and once for each [`Fault`] undone; what carries the first `u` to the second is
+//! right. Movement in between does not matter, since the accelerometer is not read there. Sums only: constant memory.
 
 use super::GRAVITY_M_S2;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
-/// Length of a window, nanoseconds: long enough to average noise, short enough for a turn of a limb to be straight.
+/// Length of a window, nanoseconds.
 const WINDOW_NS: i64 = 100_000_000;
 
-/// Farthest that a window's mean acceleration may be from gravity, m/s²: 5 % of gravity.
-const GENTLE_M_S2: f64 = 0.05 * GRAVITY_M_S2;
+/// Farthest that any acceleration in the window may be from gravity, m/s²: 3 % of gravity.
+const QUIET_M_S2: f64 = 0.03 * GRAVITY_M_S2;
 
-/// Largest change of the unit vector `u` from one window to the next that counts as small, about 23°.
-const MAX_CHANGE: f64 = 0.4;
+/// Time between two instants that are compared, nanoseconds: long enough to turn, short enough for no gyroscope to drift.
+const APART_NS: std::ops::RangeInclusive<i64> = 500_000_000..=5_000_000_000;
 
-/// Pairs of windows below which nothing is said: 2 s of gentle movement.
-const MIN_PAIRS: u64 = 20;
+/// Longest interval between samples over which a rate is integrated, nanoseconds.
+const MAX_INTERVAL_NS: i64 = 200_000_000;
 
-/// A factor with its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Factor {
-    pub(super) value: f64,
-    pub(super) standard_error: f64,
+/// Turn of `u` below which two instants are not compared, radians: 5°; a gyroscope that is stuck proves nothing.
+const TURNED: f64 = 0.087;
+
+/// Angle between the gyroscope's answer as it is and with a fault undone that tells the two apart, radians: 15°.
+const TOLD_APART: f64 = 0.262;
+
+/// Comparisons that tell a fault apart, below which nothing is said of it.
+const MIN_COMPARED: u64 = 5;
+
+/// Largest root mean square error of a fault undone that is believed, radians: 10°.
+const EXPLAINED: f64 = 0.175;
+
+/// The error of the gyroscope as it is must be larger than that of a fault undone by this factor.
+const CLEARLY: f64 = 3.0;
+
+/// What can be wrong with a gyroscope.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Fault {
+    /// Degrees per second instead of radians.
+    Degrees,
+    /// One axis has the wrong sign, by its index.
+    Mirrored(usize),
+    /// All axes have the wrong sign, which a left-handed frame shows as well.
+    LeftHanded,
 }
 
-#[derive(Debug, Clone, Default)]
-struct Window {
-    start_ns: i64,
-    n: u32,
-    acceleration: Vector3<f64>,
-    angular_rate: Vector3<f64>,
-    since_start_s: f64,
+impl Fault {
+    const ALL: [Fault; 5] =
+        [Fault::Degrees, Fault::Mirrored(0), Fault::Mirrored(1), Fault::Mirrored(2), Fault::LeftHanded];
+
+    fn undone(self, mut rate: Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Fault::Degrees => rate.map(f64::to_radians),
+            Fault::Mirrored(axis) => {
+                rate[axis] = -rate[axis];
+                rate
+            }
+            Fault::LeftHanded => -rate,
+        }
+    }
 }
 
-/// Mean time (seconds after `start_ns`), acceleration and rate of a finished window.
+/// Gravity carried along by the gyroscope as it is, and by each fault undone.
 #[derive(Debug, Clone)]
-struct Mean {
-    start_ns: i64,
-    since_start_s: f64,
-    acceleration: Vector3<f64>,
-    angular_rate: Vector3<f64>,
+pub(super) struct GravityAgreement {
+    last_ns: Option<i64>,
+    window_ns: i64,
+    n: u32,
+    sum: Vector3<f64>,
+    is_quiet: bool,
+    /// Time of the instant that was left, and `u` there carried to now.
+    anchor: Option<(i64, Vector3<f64>, [Vector3<f64>; 6])>,
+    evidence: [Evidence; 5],
 }
 
-/// The sums of the two fits.
-#[derive(Debug, Clone, Default)]
-pub(super) struct GravityAgreement {
-    window: Window,
-    previous: Option<Mean>,
-    n: u64,
-    squares: f64,
-    normal: Matrix3<f64>,
-    right: Vector3<f64>,
+impl Default for GravityAgreement {
+    fn default() -> Self {
+        Self {
+            last_ns: None,
+            window_ns: 0,
+            n: 0,
+            sum: Vector3::zeros(),
+            is_quiet: true,
+            anchor: None,
+            evidence: Default::default(),
+        }
+    }
 }
 
 impl GravityAgreement {
     pub(super) fn push(&mut self, time_ns: i64, acceleration: &Vector3<f64>, angular_rate: &Vector3<f64>) {
-        let age = i128::from(time_ns) - i128::from(self.window.start_ns);
-        if self.window.n > 0 && age >= i128::from(WINDOW_NS) {
-            self.close();
-            if age >= 2 * i128::from(WINDOW_NS) {
-                // Time was lost: the next window has no neighbour.
-                self.previous = None;
+        let interval_ns = self.last_ns.map_or(0, |last| time_ns.saturating_sub(last));
+        self.last_ns = Some(time_ns);
+        if interval_ns > MAX_INTERVAL_NS {
+            (self.anchor, self.n) = (None, 0);
+        }
+        self.carry(*angular_rate, interval_ns as f64 * 1e-9);
+        if self.n == 0 {
+            (self.window_ns, self.sum, self.is_quiet) = (time_ns, Vector3::zeros(), true);
+        }
+        self.n += 1;
+        self.sum += acceleration;
+        self.is_quiet &= (acceleration.norm() - GRAVITY_M_S2).abs() < QUIET_M_S2;
+        if time_ns - self.window_ns >= WINDOW_NS {
+            if self.is_quiet {
+                self.compare(time_ns);
+            }
+            self.n = 0;
+        }
+    }
+
+    /// Turns what was seen at the anchor to now: a direction that rests in the world turns backwards in the unit.
+    fn carry(&mut self, rate: Vector3<f64>, dt: f64) {
+        let Some((_, _, carried)) = &mut self.anchor else { return };
+        let [as_it_is, undone @ ..] = carried;
+        *as_it_is = UnitQuaternion::from_scaled_axis(-rate * dt) * *as_it_is;
+        for (up, fault) in undone.iter_mut().zip(Fault::ALL) {
+            *up = UnitQuaternion::from_scaled_axis(-fault.undone(rate) * dt) * *up;
+        }
+    }
+
+    fn compare(&mut self, time_ns: i64) {
+        // The window's mean belongs to its middle; half a window of a gentle turn is small beside 10 degrees.
+        let up = self.sum.normalize();
+        if let Some((since_ns, before, [as_it_is, undone @ ..])) = &self.anchor {
+            let apart = time_ns - since_ns;
+            if apart < *APART_NS.start() {
+                return;
+            }
+            if APART_NS.contains(&apart) && before.angle(&up) > TURNED {
+                for (evidence, undone) in self.evidence.iter_mut().zip(undone) {
+                    if as_it_is.angle(undone) > TOLD_APART {
+                        evidence.n += 1;
+                        evidence.as_it_is += as_it_is.angle(&up).powi(2);
+                        evidence.undone += undone.angle(&up).powi(2);
+                    }
+                }
             }
         }
-        if self.window.n == 0 {
-            self.window.start_ns = time_ns;
-        }
-        self.window.n += 1;
-        self.window.acceleration += acceleration;
-        self.window.angular_rate += angular_rate;
-        self.window.since_start_s += (time_ns - self.window.start_ns) as f64 * 1e-9;
+        self.anchor = Some((time_ns, up, [up; 6]));
     }
 
-    fn close(&mut self) {
-        let window = std::mem::take(&mut self.window);
-        let n = f64::from(window.n);
-        let mean = Mean {
-            start_ns: window.start_ns,
-            since_start_s: window.since_start_s / n,
-            acceleration: window.acceleration / n,
-            angular_rate: window.angular_rate / n,
-        };
-        let is_gentle = (mean.acceleration.norm() - GRAVITY_M_S2).abs() < GENTLE_M_S2;
-        if let Some(previous) = self.previous.take().filter(|_| is_gentle) {
-            self.add(&previous, &mean);
-        }
-        self.previous = is_gentle.then_some(mean);
+    /// The fault that explains how gravity turned, when one does and the gyroscope as it is does not.
+    pub(super) fn fault(&self) -> Option<Fault> {
+        let faults = Fault::ALL.into_iter().zip(&self.evidence).filter(|(_, evidence)| evidence.is_clear());
+        let least = faults.min_by(|(_, a), (_, b)| a.error().total_cmp(&b.error()));
+        least.map(|(fault, _)| fault)
+    }
+}
+
+/// Sums over the comparisons that tell one fault apart: squared errors of the gyroscope as it is and with it undone.
+#[derive(Debug, Clone, Copy, Default)]
+struct Evidence {
+    n: u64,
+    as_it_is: f64,
+    undone: f64,
+}
+
+impl Evidence {
+    /// Root mean square error with the fault undone, radians.
+    fn error(&self) -> f64 {
+        (self.undone / self.n as f64).sqrt()
     }
 
-    fn add(&mut self, before: &Mean, after: &Mean) {
-        let dt = (after.start_ns - before.start_ns) as f64 * 1e-9 + after.since_start_s - before.since_start_s;
-        let (u, v) = (before.acceleration.normalize(), after.acceleration.normalize());
-        let change = v - u;
-        if change.norm() > MAX_CHANGE {
-            return;
-        }
-        let (up, rate) = ((u + v) / 2.0, (before.angular_rate + after.angular_rate) / 2.0);
-        let turns = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| up.cross(&axis) * rate.dot(&axis) * dt);
-        let columns = Matrix3::from_columns(&turns);
-        self.normal += columns.transpose() * columns;
-        self.right += columns.transpose() * change;
-        self.squares += change.norm_squared();
-        self.n += 1;
-    }
-
-    /// The factor of all axes, k.
-    pub(super) fn overall(&self) -> Option<Factor> {
-        let normal = self.normal.sum();
-        if self.n < MIN_PAIRS || normal <= f64::MIN_POSITIVE {
-            return None;
-        }
-        let value = self.right.sum() / normal;
-        let variance = (self.squares - value * self.right.sum()).max(0.0) / (2 * self.n - 1) as f64;
-        Some(Factor { value, standard_error: (variance / normal).sqrt() })
-    }
-
-    /// The factor of each axis of the gyroscope, s; nothing where the unit did not turn about an axis.
-    pub(super) fn of_axes(&self) -> Option<[Factor; 3]> {
-        if self.n < MIN_PAIRS {
-            return None;
-        }
-        let inverse = self.normal.try_inverse()?;
-        let value = inverse * self.right;
-        let variance = (self.squares - value.dot(&self.right)).max(0.0) / (2 * self.n - 3) as f64;
-        let factor =
-            |i: usize| Factor { value: value[i], standard_error: (variance * inverse[(i, i)].max(0.0)).sqrt() };
-        Some([factor(0), factor(1), factor(2)])
+    fn is_clear(&self) -> bool {
+        let as_it_is = (self.as_it_is / self.n as f64).sqrt();
+        self.n >= MIN_COMPARED && self.error() < EXPLAINED && as_it_is > CLEARLY * self.error()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::UnitQuaternion;
 
-    /// A unit that turns about all axes for 20 s at 100 Hz, its gyroscope changed by `measured`.
-    fn agreement(measured: impl Fn(Vector3<f64>) -> Vector3<f64>) -> GravityAgreement {
+    /// What is found of a unit that turns about all axes for 20 s at 100 Hz, its gyroscope changed by `measured`, pushed
+    /// about by up to `push` m/s².
+    fn found(push: f64, measured: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Option<Fault> {
         let mut agreement = GravityAgreement::default();
         let mut world_from_imu = UnitQuaternion::identity();
         for i in 0..2000 {
             let t = f64::from(i) * 0.01;
             let rate = Vector3::new((1.3 * t).sin(), 0.8 * (0.9 * t + 1.0).cos(), 0.7 * (1.7 * t).sin());
-            let up = world_from_imu.inverse() * Vector3::new(0.0, GRAVITY_M_S2, 0.0);
+            // Pushed every other second.
+            let pushed = if i % 200 < 100 { push * (8.0 * t).sin() } else { 0.0 };
+            let up = world_from_imu.inverse() * Vector3::new(pushed, GRAVITY_M_S2, pushed);
             agreement.push(i64::from(i) * 10_000_000, &up, &measured(rate));
             world_from_imu *= UnitQuaternion::from_scaled_axis(rate * 0.01);
         }
-        agreement
+        agreement.fault()
     }
 
     #[test]
-    fn a_sound_unit_has_factors_of_one() {
-        let agreement = agreement(|rate| rate);
-        let factors = agreement.of_axes().unwrap();
-        // Windows of 0.1 s bend a turn of 1 rad/s by less than 1 %.
-        assert!(factors.iter().all(|factor| (factor.value - 1.0).abs() < 0.01), "{factors:?}");
-        assert!((agreement.overall().unwrap().value - 1.0).abs() < 0.01);
+    fn a_sound_unit_has_no_fault_however_it_is_pushed() {
+        for push in [0.0, 2.0, 20.0] {
+            assert_eq!(found(push, |rate| rate), None, "{push} m/s²");
+        }
     }
 
     #[test]
-    fn rates_in_degrees_have_a_factor_of_pi_over_180() {
-        let factor = agreement(|rate| rate.map(f64::to_degrees)).overall().unwrap();
-        assert!((factor.value.to_degrees() - 1.0).abs() < 0.01 && factor.standard_error < 1e-3, "{factor:?}");
+    fn every_fault_is_found_also_in_a_unit_that_is_pushed() {
+        for push in [0.0, 2.0, 20.0] {
+            assert_eq!(found(push, |rate| rate.map(f64::to_degrees)), Some(Fault::Degrees), "{push} m/s²");
+            assert_eq!(found(push, |rate| -rate), Some(Fault::LeftHanded), "{push} m/s²");
+            for axis in 0..3 {
+                let mirrored = |mut rate: Vector3<f64>| {
+                    rate[axis] = -rate[axis];
+                    rate
+                };
+                assert_eq!(found(push, mirrored), Some(Fault::Mirrored(axis)), "{push} m/s²");
+            }
+        }
     }
 
     #[test]
-    fn a_mirrored_axis_has_a_factor_of_minus_one() {
-        let factors = agreement(|rate| Vector3::new(rate.x, -rate.y, rate.z)).of_axes().unwrap();
-        let expected = [1.0, -1.0, 1.0];
-        assert!(factors.iter().zip(expected).all(|(factor, s)| (factor.value - s).abs() < 0.01), "{factors:?}");
-    }
-
-    #[test]
-    fn a_unit_that_does_not_turn_or_is_shaken_hard_says_nothing() {
-        let still = agreement(|_| Vector3::zeros());
-        assert!(still.overall().is_none() && still.of_axes().is_none());
-        let mut shaken = GravityAgreement::default();
-        (0..2000).for_each(|i| shaken.push(i * 10_000_000, &Vector3::new(20.0, 0.0, 0.0), &Vector3::x()));
-        assert!(shaken.overall().is_none());
+    fn a_unit_that_does_not_turn_says_nothing() {
+        let mut still = GravityAgreement::default();
+        (0..2000).for_each(|i| still.push(i * 10_000_000, &Vector3::new(0.0, 9.8, 0.0), &Vector3::x()));
+        assert_eq!(still.fault(), None);
     }
 }

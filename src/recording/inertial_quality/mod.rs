@@ -11,7 +11,7 @@ mod rail;
 mod tests;
 
 use super::inertial::Segment;
-use gravity::{Factor, GravityAgreement};
+use gravity::{Fault, GravityAgreement};
 use histogram::LogHistogram;
 use nalgebra::Vector3;
 use rail::Rail;
@@ -29,18 +29,6 @@ const PLAUSIBLE_MEDIAN_M_S2: std::ops::RangeInclusive<f64> = 8.8..=12.5;
 
 /// Samples below which a median says nothing.
 const MIN_SAMPLES: u64 = 50;
-
-/// Factors of a gyroscope in degrees, around π/180 = 0.0175.
-const DEGREES: std::ops::RangeInclusive<f64> = 0.012..=0.025;
-
-/// Standard error below which the factor of all axes is believed: a seventh of π/180.
-const SURE_OF_DEGREES: f64 = 0.0025;
-
-/// Factors of all axes outside which the scale is doubtful; movement biases them by up to about 0.2.
-const PLAUSIBLE_FACTOR: std::ops::RangeInclusive<f64> = 0.7..=1.4;
-
-/// Standard error below which a factor is believed.
-const SURE_OF_FACTOR: f64 = 0.1;
 
 /// Magnitudes below which an axis is not clipped: no unit's range ends under ±2 g or ±250 °/s (4.4 rad/s).
 const LEAST_RAILS: [f64; 2] = [15.0, 4.0];
@@ -75,8 +63,6 @@ pub enum InertialWarningKind {
     ConstantAngularRate,
     /// The typical acceleration is not that of gravity and a movement.
     AccelerationScale,
-    /// The gyroscope turns gravity too fast or too slowly.
-    AngularRateScale,
     /// The gyroscope turns gravity the wrong way about an axis.
     MirroredAxis,
     /// The time stamps do not have the declared rate.
@@ -124,8 +110,8 @@ pub struct InertialSummary {
 pub enum WrongUnit {
     /// The median magnitude of the acceleration, here in the unit as sent, is not near gravity in m/s².
     Acceleration(f64),
-    /// The gyroscope turns gravity by this factor, close to π/180.
-    AngularRate(f64),
+    /// Only in degrees does the gyroscope turn gravity as the accelerometer sees it turn.
+    AngularRateInDegrees,
 }
 
 /// Sums over the samples of one unit.
@@ -211,9 +197,7 @@ impl UnitStatistics {
         if let Some(median) = self.median_magnitude().filter(|median| !POSSIBLE_MEDIAN_M_S2.contains(median)) {
             return Some(WrongUnit::Acceleration(median));
         }
-        let factor = self.gravity.overall()?;
-        let is_degrees = DEGREES.contains(&factor.value) && factor.standard_error < SURE_OF_DEGREES;
-        is_degrees.then_some(WrongUnit::AngularRate(factor.value))
+        (self.gravity.fault() == Some(Fault::Degrees)).then_some(WrongUnit::AngularRateInDegrees)
     }
 
     fn median_magnitude(&self) -> Option<f64> {
@@ -253,7 +237,7 @@ impl UnitStatistics {
             warn(AccelerationScale, sentence);
         }
         warnings.extend(self.clock_warnings(nominal_rate_hz));
-        warnings.extend(self.gravity_warnings());
+        warnings.extend(self.gravity_warning());
         warnings
     }
 
@@ -288,29 +272,14 @@ impl UnitStatistics {
         warnings
     }
 
-    fn gravity_warnings(&self) -> Vec<InertialWarning> {
-        use InertialWarningKind::{AngularRateScale, MirroredAxis};
-        let is_sure = |factor: &Factor| factor.standard_error < SURE_OF_FACTOR;
-        let axes = self.gravity.of_axes().into_iter().flatten().zip(["x", "y", "z"]);
-        let is_mirrored = |factor: &Factor| is_sure(factor) && factor.value < -0.5;
-        let mirrored: Vec<&str> = axes.filter(|(factor, _)| is_mirrored(factor)).map(|(_, axis)| axis).collect();
-        if !mirrored.is_empty() {
-            let sentence = format!(
-                "the gyroscope turns gravity the wrong way about {}: mirrored axes, or a left-handed frame",
-                mirrored.join(", ")
-            );
-            return vec![InertialWarning { kind: MirroredAxis, sentence }];
-        }
-        match self.gravity.overall().filter(is_sure) {
-            Some(factor) if !PLAUSIBLE_FACTOR.contains(&factor.value) => {
-                let sentence = format!(
-                    "gravity turns {:.2} times as fast in the accelerometer as the gyroscope says, expected 1",
-                    factor.value
-                );
-                vec![InertialWarning { kind: AngularRateScale, sentence }]
-            }
-            _ => Vec::new(),
-        }
+    fn gravity_warning(&self) -> Option<InertialWarning> {
+        let what = match self.gravity.fault()? {
+            Fault::Degrees => return None,
+            Fault::Mirrored(axis) => format!("about {}: is that axis mirrored?", ["x", "y", "z"][axis.min(2)]),
+            Fault::LeftHanded => "about every axis: is the unit's frame left-handed?".to_owned(),
+        };
+        let sentence = format!("the gyroscope turns gravity the wrong way {what}");
+        Some(InertialWarning { kind: InertialWarningKind::MirroredAxis, sentence })
     }
 }
 
