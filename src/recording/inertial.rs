@@ -10,7 +10,8 @@ macro_rules! segments {
     ($($(#[$doc:meta])* $variant:ident = $name:literal),+ $(,)?) => {
         /// What an inertial unit is fixed to: a segment of the body, or an object that is none.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
-        pub enum Segment { $($(#[$doc])* #[serde(rename = $name)] $variant),+ }
+        #[serde(rename_all = "snake_case")]
+        pub enum Segment { $($(#[$doc])* $variant),+ }
 
         impl Segment {
             /// Every segment, in the order of declaration.
@@ -50,15 +51,15 @@ segments! {
     /// Right foot.
     RightFoot = "right_foot",
     /// First rigid object that is no part of a person: a rod, a plank, a link of a test chain.
-    Object1 = "object_1",
+    Object1 = "object1",
     /// Second object.
-    Object2 = "object_2",
+    Object2 = "object2",
     /// Third object.
-    Object3 = "object_3",
+    Object3 = "object3",
     /// Fourth object.
-    Object4 = "object_4",
+    Object4 = "object4",
     /// Fifth object.
-    Object5 = "object_5",
+    Object5 = "object5",
 }
 
 /// A name that is not a segment's.
