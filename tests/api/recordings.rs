@@ -50,7 +50,7 @@ async fn both_formats_are_taken_and_recognised_by_their_first_bytes_when_unnamed
 #[tokio::test]
 async fn inertial_units_alone_are_taken_and_described_and_their_joint_angles_refused_in_a_sentence() {
     let app = TestApp::new().await;
-    let n = 0..100i64;
+    let n = 0..101i64;
     let document = json!({
         "format": "surefoot", "version": 1,
         "coordinates": {"handedness": "right", "up": "+y", "length_unit": "m"},
@@ -65,11 +65,11 @@ async fn inertial_units_alone_are_taken_and_described_and_their_joint_angles_ref
     let upload = app.post(&path).body("application/json", document.to_string()).send().await;
     let body = upload.expect(StatusCode::ACCEPTED);
     let inspection = &body["recording"]["inspection"];
-    assert_eq!((&inspection["n_frames"], &inspection["duration_s"]), (&json!(0), &json!(0.99)));
+    assert_eq!((&inspection["n_frames"], &inspection["duration_s"]), (&json!(0), &json!(1.0)));
     let unit = &inspection["inertial_units"][0];
     assert_eq!(
         (&unit["segment"], &unit["n_samples"], &unit["rate_hz"]),
-        (&json!("left_thigh"), &json!(100), &json!(100.0))
+        (&json!("left_thigh"), &json!(101), &json!(100.0))
     );
     assert_eq!(unit["warnings"][0]["kind"], "rate_differs", "{unit:#}");
 
