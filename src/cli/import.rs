@@ -40,6 +40,27 @@ enum DatasetName {
     Keraal,
     /// CMU motion capture, subject 02: walking with exact knee angles.
     Cmu,
+    /// BROAD: one inertial unit in the hand, with its optical orientation.
+    #[value(name = "broad")]
+    Broad,
+    /// RepoIMU: one inertial unit on a rod, with the rod's optical orientation.
+    #[value(name = "repoimu")]
+    Repoimu,
+    /// Five-segment chain with hinges, units and optical orientation.
+    #[value(name = "ring_chain")]
+    RingChain,
+    /// Thigh and shank in sit-to-stands, with knee flexion from markers.
+    #[value(name = "knee_sts")]
+    KneeSts,
+    /// Thigh and shank in drop landings and cutting, with knee flexion.
+    #[value(name = "knee_drop_cut")]
+    KneeDropCut,
+    /// Nine units on one person.
+    #[value(name = "qmt_fullbody")]
+    QmtFullbody,
+    /// Exports of an x-IMU, `…_CalInertialAndMag.csv`.
+    #[value(name = "ximu_gait")]
+    XimuGait,
 }
 
 impl From<DatasetName> for Dataset {
@@ -49,6 +70,13 @@ impl From<DatasetName> for Dataset {
             DatasetName::Utdmhad => Dataset::Utdmhad,
             DatasetName::Keraal => Dataset::Keraal,
             DatasetName::Cmu => Dataset::Cmu,
+            DatasetName::Broad => Dataset::Broad,
+            DatasetName::Repoimu => Dataset::Repoimu,
+            DatasetName::RingChain => Dataset::RingChain,
+            DatasetName::KneeSts => Dataset::KneeSts,
+            DatasetName::KneeDropCut => Dataset::KneeDropCut,
+            DatasetName::QmtFullbody => Dataset::QmtFullbody,
+            DatasetName::XimuGait => Dataset::XimuGait,
         }
     }
 }
@@ -95,11 +123,12 @@ fn summary(report: &ImportReport, args: &Args) -> String {
     let unsure = report.trials.iter().filter_map(|trial| trial.clock_offset.as_ref());
     let unsure = unsure.filter(|clock| !clock.is_determined).count();
     format!(
-        "{} recordings ({} with a reference, {} frames) written to {}\n\
+        "{} recordings ({} with a reference, {} frames, {} inertial samples) written to {}\n\
          lost joints {}, jumps {}, missing orientations {}, lost reference markers {}, trials without a sure lag {unsure}",
         report.n_trials,
         report.n_trials_with_reference,
         report.n_frames,
+        report.n_inertial_samples,
         args.out.display(),
         defects.lost_joints,
         defects.jumps,

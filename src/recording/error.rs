@@ -28,7 +28,9 @@ impl DecodeError {
 }
 
 /// Every code of a [`DecodeError`], sorted; `docs/recording-format.md` says what each means.
-pub const DECODE_CODES: [&str; 33] = [
+pub const DECODE_CODES: [&str; 37] = [
+    "acceleration_unit",
+    "angular_rate_unit",
     "bad_quaternion",
     "checksum_mismatch",
     "confidence_out_of_range",
@@ -46,6 +48,7 @@ pub const DECODE_CODES: [&str; 33] = [
     "not_finite",
     "position_out_of_range",
     "record_too_large",
+    "sample_count_mismatch",
     "time_not_increasing",
     "too_few_frames",
     "too_large",
@@ -56,6 +59,7 @@ pub const DECODE_CODES: [&str; 33] = [
     "truncated",
     "unknown_field",
     "unknown_joint",
+    "unknown_segment",
     "unknown_topic",
     "unreadable",
     "unsupported_compression",

@@ -8,10 +8,13 @@ pub mod decode;
 pub mod encode;
 pub mod error;
 pub mod import;
+pub mod inertial;
+pub mod inertial_quality;
 pub mod skeleton;
 
 pub use decode::{Format, Inspection, Inspector, Limits, decode};
 pub use error::DecodeError;
+pub use inertial::{InertialRecording, InertialSensor, Segment};
 pub use skeleton::{ReferenceSeries, SkeletonRecording};
 
 use serde::{Deserialize, Serialize};
@@ -25,6 +28,8 @@ pub struct Recording {
     pub header: Header,
     /// The camera's skeleton, when there is one.
     pub skeleton: Option<SkeletonRecording>,
+    /// The inertial units, when there are any.
+    pub inertial: Option<InertialRecording>,
     /// Gold-standard series that came with the recording, for evaluation.
     pub references: Vec<ReferenceSeries>,
 }

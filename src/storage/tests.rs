@@ -69,6 +69,7 @@ async fn new_recording(store: &Store, session_id: SessionId) -> NewRecording {
         duration_s: 19.97,
         joints: vec![crate::body::Joint::Head],
         has_orientations: false,
+        inertial_units: vec![],
         reference_channels: vec![],
         ignored_channels: vec![],
     };

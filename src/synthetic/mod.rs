@@ -140,7 +140,7 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Simulation, SettingOutO
         start_time: None,
     };
     let references = truth(&skeleton.time_ns, &poses, &thetas);
-    let recording = Recording { header, skeleton: Some(skeleton), references };
+    let recording = Recording { header, skeleton: Some(skeleton), inertial: None, references };
     Ok(Simulation { recording, subject, stances })
 }
 

@@ -114,6 +114,7 @@ fn inspection() -> Inspection {
         duration_s: 0.1,
         joints: Vec::new(),
         has_orientations: false,
+        inertial_units: Vec::new(),
         reference_channels: Vec::new(),
         ignored_channels: Vec::new(),
     }

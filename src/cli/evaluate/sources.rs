@@ -15,7 +15,7 @@ pub(super) fn imported(directory: &Path) -> anyhow::Result<Vec<TrialSource>> {
         );
     }
     let mut sources = Vec::new();
-    for dataset in Dataset::ALL {
+    for dataset in Dataset::WITH_SKELETON {
         let found = match list(dataset, directory) {
             Ok(found) => found,
             Err(ImportError::NotFound { .. }) => continue,
@@ -32,7 +32,7 @@ pub(super) fn imported(directory: &Path) -> anyhow::Result<Vec<TrialSource>> {
         }
     }
     if sources.is_empty() {
-        let names = Dataset::ALL.map(Dataset::name).join(", ");
+        let names = Dataset::WITH_SKELETON.map(Dataset::name).join(", ");
         bail!(
             "no trials of {names} below {}; give their directory with --data, or use --simulated",
             directory.display()

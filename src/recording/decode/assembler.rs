@@ -1,6 +1,7 @@
 //! Values in, recording out: everything that both formats check, one frame at a time.
 
 use super::checks::{MAX_TEXT, check_counts, check_segment_lengths, checked_sample};
+use super::inertial::InertialAssembler;
 use super::limits::{Format, Limits};
 use super::message::{FrameMessage, List};
 use super::{IgnoredChannel, Inspection};
@@ -34,6 +35,8 @@ pub(super) struct Assembler {
     references: Vec<Reference>,
     n_reference_samples: u64,
     ignored: BTreeMap<String, u64>,
+    /// The inertial units, checked apart.
+    pub(super) inertial: InertialAssembler,
 }
 
 struct Reference {
@@ -45,6 +48,7 @@ impl Assembler {
     pub(super) fn new(limits: Limits, keep: bool) -> Self {
         Self {
             keep,
+            inertial: InertialAssembler::new(limits.clone(), keep),
             limits,
             header: None,
             joints: None,
@@ -296,8 +300,9 @@ impl Assembler {
             return Err(DecodeError::new("missing_header", sentence));
         };
         match self.n_frames {
-            0 => {
-                let sentence = "the recording has no skeleton frame; record at least two and send them as `/skeleton`";
+            0 if !self.inertial.has_samples() => {
+                let sentence = "the recording has neither a skeleton frame nor an inertial sample; send `/skeleton` or \
+                                `/inertial/…`";
                 return Err(DecodeError::new("empty_recording", sentence));
             }
             1 => {
@@ -306,13 +311,17 @@ impl Assembler {
             }
             _ => {}
         }
+        let (inertial_units, inertial) = self.inertial.finish()?;
+        let has_skeleton = self.n_frames > 0;
+        let longest_unit_s = inertial_units.iter().map(|unit| unit.duration_s).fold(0.0, f64::max);
         let inspection = Inspection {
             format,
             header: header.clone(),
             n_frames: self.n_frames,
-            duration_s: (self.last_ns - self.first_ns) as f64 * 1e-9,
-            joints: self.joints.unwrap_or_default(),
+            duration_s: if has_skeleton { (self.last_ns - self.first_ns) as f64 * 1e-9 } else { longest_unit_s },
+            joints: self.joints.filter(|_| has_skeleton).unwrap_or_default(),
             has_orientations: self.has_orientations,
+            inertial_units,
             reference_channels: self.references.iter().map(|known| known.series.channel.clone()).collect(),
             ignored_channels: self
                 .ignored
@@ -325,7 +334,8 @@ impl Assembler {
         }
         let recording = self.keep.then(|| Recording {
             header,
-            skeleton: Some(self.skeleton),
+            skeleton: has_skeleton.then_some(self.skeleton),
+            inertial,
             references: self.references.into_iter().map(|known| known.series).collect(),
         });
         Ok(Assembled { inspection, recording })

@@ -7,8 +7,9 @@ use super::assembler::Assembler;
 use super::checks::coordinates_from_names;
 use super::json_error::defect_in_json;
 use super::limits::BYTE_ORDER_MARK;
-use super::message::{FrameMessage, Preamble, ReferenceMessage};
+use super::message::{FrameMessage, InertialMessage, Preamble, ReferenceMessage};
 use crate::recording::DecodeError;
+use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -52,13 +53,22 @@ impl JsonDecoder {
         let coordinates =
             coordinates_from_names(&declared.handedness, &declared.up, &declared.length_unit, "coordinates")?;
         assembler.declare(preamble.header, coordinates, "header")?;
-        let joints = &preamble.joints;
-        if joints.count > joints.items.len() {
-            let sentence =
-                format!("there are {} joints, more than any sensor names; name every joint once", joints.count);
-            return Err(DecodeError::new("duplicate_joint", sentence).at("joints"));
+        match (&preamble.joints, &preamble.frames) {
+            (Some(joints), Some(_)) => {
+                if joints.count > joints.items.len() {
+                    let sentence =
+                        format!("there are {} joints, more than any sensor names; name every joint once", joints.count);
+                    return Err(DecodeError::new("duplicate_joint", sentence).at("joints"));
+                }
+                assembler.skeleton_channel(joints.items.iter().map(String::as_str), "joints")?;
+            }
+            (None, None) => {}
+            (joints, _) => {
+                let (absent, present) = if joints.is_none() { ("joints", "frames") } else { ("frames", "joints") };
+                let sentence = format!("`{absent}` is missing beside `{present}`; a skeleton needs both");
+                return Err(DecodeError::new("missing_field", sentence).at(absent));
+            }
         }
-        assembler.skeleton_channel(joints.items.iter().map(String::as_str), "joints")?;
 
         let mut body = Body { assembler, defect: None };
         let mut parser = serde_json::Deserializer::from_slice(text);
@@ -97,8 +107,9 @@ impl<'de> Visitor<'de> for &mut Body<'_> {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
         while let Some(key) = map.next_key::<std::borrow::Cow<'de, str>>()? {
             match key.as_ref() {
-                "frames" => map.next_value_seed(Frames(self))?,
-                "references" => map.next_value_seed(References(self))?,
+                "frames" => map.next_value_seed(Elements { body: self, take: take_frame })?,
+                "references" => map.next_value_seed(Elements { body: self, take: take_reference })?,
+                "inertial" => map.next_value_seed(Elements { body: self, take: take_unit })?,
                 _ => {
                     map.next_value::<IgnoredAny>()?;
                 }
@@ -108,42 +119,38 @@ impl<'de> Visitor<'de> for &mut Body<'_> {
     }
 }
 
-struct Frames<'a, 'b>(&'a mut Body<'b>);
-
-impl<'de> DeserializeSeed<'de> for Frames<'_, '_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_seq(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Frames<'_, '_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a list of frames")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
-        while let Some(frame) = list.next_element::<FrameMessage>()? {
-            let result = match frame.time_ns {
-                Some(time_ns) => self.0.assembler.frame(time_ns, &frame),
-                None => {
-                    let place = format!("frames[{}]", self.0.assembler.n_frames());
-                    let sentence = "the frame has no `time_ns`; give every frame its time in nanoseconds";
-                    Err(DecodeError::new("missing_field", sentence).at(place))
-                }
-            };
-            self.0.check(result)?;
+fn take_frame(assembler: &mut Assembler, frame: FrameMessage, _index: usize) -> Result<(), DecodeError> {
+    match frame.time_ns {
+        Some(time_ns) => assembler.frame(time_ns, &frame),
+        None => {
+            let place = format!("frames[{}]", assembler.n_frames());
+            let sentence = "the frame has no `time_ns`; give every frame its time in nanoseconds";
+            Err(DecodeError::new("missing_field", sentence).at(place))
         }
-        Ok(())
     }
 }
 
-struct References<'a, 'b>(&'a mut Body<'b>);
+fn take_reference(assembler: &mut Assembler, reference: ReferenceMessage, index: usize) -> Result<(), DecodeError> {
+    let place = format!("references[{index}]");
+    let ReferenceMessage { channel, source, clock_offset_ns, time_ns, values } = reference;
+    let number = assembler.reference_channel(&channel, &source, clock_offset_ns, &place)?;
+    assembler.reference_batch(number, time_ns, values, &place)
+}
 
-impl<'de> DeserializeSeed<'de> for References<'_, '_> {
+fn take_unit(assembler: &mut Assembler, unit: InertialMessage, index: usize) -> Result<(), DecodeError> {
+    let place = format!("inertial[{index}]");
+    let (declaration, samples) = unit.into_parts();
+    let number = assembler.inertial.declare(declaration, &place)?;
+    assembler.inertial.batch(number, samples, &place)
+}
+
+/// The elements of a list, or null for none, each handed to the assembler with its index.
+struct Elements<'a, 'b, T> {
+    body: &'a mut Body<'b>,
+    take: fn(&mut Assembler, T, usize) -> Result<(), DecodeError>,
+}
+
+impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Elements<'_, '_, T> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
@@ -151,15 +158,11 @@ impl<'de> DeserializeSeed<'de> for References<'_, '_> {
     }
 }
 
-impl<'de> Visitor<'de> for References<'_, '_> {
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Elements<'_, '_, T> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a list of reference series")
-    }
-
-    fn visit_unit<E: Error>(self) -> Result<(), E> {
-        Ok(())
+        f.write_str("a list")
     }
 
     fn visit_none<E: Error>(self) -> Result<(), E> {
@@ -172,13 +175,9 @@ impl<'de> Visitor<'de> for References<'_, '_> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
         let mut index = 0;
-        while let Some(reference) = list.next_element::<ReferenceMessage>()? {
-            let place = format!("references[{index}]");
-            let assembler = &mut *self.0.assembler;
-            let result = assembler
-                .reference_channel(&reference.channel, &reference.source, reference.clock_offset_ns, &place)
-                .and_then(|number| assembler.reference_batch(number, reference.time_ns, reference.values, &place));
-            self.0.check(result)?;
+        while let Some(element) = list.next_element::<T>()? {
+            let result = (self.take)(self.body.assembler, element, index);
+            self.body.check(result)?;
             index += 1;
         }
         Ok(())

@@ -58,6 +58,9 @@ pub struct Limits {
     pub max_duration_s: u64,
     /// Samples of all reference channels together; default 10 million.
     pub max_reference_samples: u64,
+    /// Samples of all inertial units together; default 10 million: two hours of nine units at 150 Hz, at most 800 MB
+    /// decoded.
+    pub max_inertial_samples: u64,
     /// Bytes of a JSON recording, which is parsed in memory; default 32 MiB.
     pub max_json_bytes: usize,
     /// Bytes of one MCAP record, and of one MCAP chunk before and after decompression; default 16 MiB.
@@ -74,6 +77,7 @@ impl Default for Limits {
             max_frames: 500_000,
             max_duration_s: 12 * 3600,
             max_reference_samples: 10_000_000,
+            max_inertial_samples: 10_000_000,
             max_json_bytes: 32 << 20,
             max_chunk_bytes: 16 << 20,
             max_decompressed_bytes: 4 << 30,

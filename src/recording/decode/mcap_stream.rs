@@ -5,18 +5,16 @@ use super::checks::coordinates_from_names;
 use super::chunk::{self, Opener};
 use super::json_error::defect_in_json;
 use super::limits::Limits;
-use super::message::{BatchMessage, FrameMessage};
+use super::message::{BatchMessage, FrameMessage, InertialBatchMessage};
 use super::record::{Channel, Chunk, Fields, Malformed, Message, Statistics, opcode};
+use super::topic::{Topic, required, topic};
 use crate::recording::{DecodeError, Device, Header};
 use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 /// Name of the metadata record, and of the profile, that make an MCAP file a recording.
 const PROFILE: &str = "surefoot";
-
-/// Longest accepted topic, bytes.
-const MAX_TOPIC: usize = 128;
 
 pub(super) struct McapDecoder {
     container: LinearReader,
@@ -98,13 +96,6 @@ impl McapDecoder {
 /// A defect without a field path is placed by the bytes read so far.
 fn place_by_byte(defect: DecodeError, at: u64) -> DecodeError {
     if defect.place.is_some() { defect } else { defect.at(format!("byte {at}")) }
-}
-
-/// What a channel's messages are.
-enum Topic {
-    Skeleton,
-    Reference { number: usize, n_batches: u64 },
-    Ignored(String),
 }
 
 /// Everything read from the records so far.
@@ -234,6 +225,13 @@ impl Content {
                     .map_err(|error| defect_in_json(message.data, &error, &place))?;
                 assembler.reference_batch(*number, batch.time_ns, batch.values, &place)
             }
+            Topic::Inertial { number, n_batches } => {
+                let place = format!("inertial[{number}].batches[{n_batches}]");
+                *n_batches += 1;
+                let batch: InertialBatchMessage = serde_json::from_slice(message.data)
+                    .map_err(|error| defect_in_json(message.data, &error, &place))?;
+                assembler.inertial.batch(*number, batch.into_samples(), &place)
+            }
             Topic::Ignored(topic) => {
                 assembler.ignore(topic);
                 Ok(())
@@ -260,51 +258,6 @@ impl Content {
 fn malformed(_: Malformed) -> DecodeError {
     let sentence = "a record is shorter than its fields say, or its text is not UTF-8; write it with an MCAP library";
     DecodeError::new("invalid_mcap", sentence)
-}
-
-fn topic(channel: &Channel<'_>, assembler: &mut Assembler) -> Result<Topic, DecodeError> {
-    let name = channel.topic;
-    let place = format!("channel {}", channel.id);
-    if name.len() > MAX_TOPIC {
-        let sentence = format!("a topic has {} bytes, at most {MAX_TOPIC} are accepted", name.len());
-        return Err(DecodeError::new("unknown_topic", sentence).at(place));
-    }
-    let is_reserved = matches!(name, "/depth" | "/depth/calibration" | "/depth/background");
-    if is_reserved || name.starts_with("/inertial/") || name.starts_with("/x/") {
-        return Ok(Topic::Ignored(name.to_owned()));
-    }
-    let reference = name.strip_prefix("/reference/");
-    if name != "/skeleton" && reference.is_none() {
-        let sentence = format!("topic `{name}` is not part of the format; put your own topics under `/x/`");
-        return Err(DecodeError::new("unknown_topic", sentence).at(place));
-    }
-    if channel.message_encoding != "json" {
-        let found: String = channel.message_encoding.chars().take(32).collect();
-        let sentence = format!("messages of `{name}` are encoded as `{found}`, expected `json`");
-        return Err(DecodeError::new("unsupported_encoding", sentence).at(name));
-    }
-    let Some(reference) = reference else {
-        let names = required(&channel.metadata, "joints", name)?;
-        assembler.skeleton_channel(names.split(',').map(str::trim), "joints")?;
-        return Ok(Topic::Skeleton);
-    };
-    let source = required(&channel.metadata, "source", name)?;
-    let clock_offset_ns = match channel.metadata.get("clock_offset_ns") {
-        Some(text) => text.parse().map_err(|_| {
-            let sentence = "`clock_offset_ns` is not a whole number of nanoseconds";
-            DecodeError::new("invalid_value", sentence).at(format!("{name}.clock_offset_ns"))
-        })?,
-        None => 0,
-    };
-    let number = assembler.reference_channel(reference, source, clock_offset_ns, name)?;
-    Ok(Topic::Reference { number, n_batches: 0 })
-}
-
-fn required<'a>(metadata: &BTreeMap<&'a str, &'a str>, key: &str, place: &str) -> Result<&'a str, DecodeError> {
-    metadata.get(key).copied().ok_or_else(|| {
-        let sentence = format!("`{key}` is missing; see the page on the recording format");
-        DecodeError::new("missing_field", sentence).at(format!("{place}.{key}"))
-    })
 }
 
 fn skeleton_message(message: &Message<'_>, assembler: &mut Assembler) -> Result<(), DecodeError> {

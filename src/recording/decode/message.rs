@@ -1,5 +1,6 @@
 //! The JSON values inside a recording, bounded in memory, before their meaning is checked.
 
+use super::inertial::{Declaration, Samples};
 use serde::de::{Deserializer, Error, IgnoredAny, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -45,6 +46,55 @@ pub(super) struct ReferenceMessage {
     pub(super) values: List<Option<f64>, MAX_BATCH>,
 }
 
+/// Batch of inertial samples as written in an MCAP message.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InertialBatchMessage {
+    time_ns: List<i64, MAX_BATCH>,
+    acceleration: List<Numbers<3>, MAX_BATCH>,
+    angular_rate: List<Numbers<3>, MAX_BATCH>,
+    #[serde(default)]
+    magnetic_field: Option<List<Numbers<3>, MAX_BATCH>>,
+}
+
+impl InertialBatchMessage {
+    pub(super) fn into_samples(self) -> Samples<MAX_BATCH> {
+        let Self { time_ns, acceleration, angular_rate, magnetic_field } = self;
+        Samples { time_ns, acceleration, angular_rate, magnetic_field }
+    }
+}
+
+/// Element of `inertial` in a JSON recording.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InertialMessage {
+    segment: String,
+    #[serde(default)]
+    device_model: Option<String>,
+    #[serde(default)]
+    mounting: Option<String>,
+    #[serde(default)]
+    nominal_rate_hz: Option<f64>,
+    #[serde(default)]
+    clock_offset_ns: i64,
+    time_ns: List<i64, MAX_BATCH>,
+    acceleration: List<Numbers<3>, MAX_BATCH>,
+    angular_rate: List<Numbers<3>, MAX_BATCH>,
+    #[serde(default)]
+    magnetic_field: Option<List<Numbers<3>, MAX_BATCH>>,
+}
+
+impl InertialMessage {
+    pub(super) fn into_parts(self) -> (Declaration, Samples<MAX_BATCH>) {
+        let Self { segment, device_model, mounting, nominal_rate_hz, clock_offset_ns, .. } = self;
+        let Self { time_ns, acceleration, angular_rate, magnetic_field, .. } = self;
+        (
+            Declaration { segment, device_model, mounting, nominal_rate_hz, clock_offset_ns },
+            Samples { time_ns, acceleration, angular_rate, magnetic_field },
+        )
+    }
+}
+
 /// `coordinates` of a JSON recording.
 #[derive(Debug, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -63,9 +113,12 @@ pub(super) struct Preamble {
     pub(super) coordinates: CoordinatesMessage,
     #[serde(default)]
     pub(super) header: crate::recording::Header,
-    pub(super) joints: List<String, MAX_JOINTS>,
-    #[serde(rename = "frames")]
-    pub(super) _frames: IgnoredAny,
+    #[serde(default)]
+    pub(super) joints: Option<List<String, MAX_JOINTS>>,
+    #[serde(default)]
+    pub(super) frames: Option<IgnoredAny>,
+    #[serde(default, rename = "inertial")]
+    pub(super) _inertial: Option<IgnoredAny>,
     #[serde(default, rename = "references")]
     pub(super) _references: Option<IgnoredAny>,
 }

@@ -7,6 +7,7 @@
 mod assembler;
 mod checks;
 mod chunk;
+mod inertial;
 mod json;
 mod json_error;
 mod limits;
@@ -15,9 +16,11 @@ mod message;
 mod record;
 #[cfg(test)]
 mod tests;
+mod topic;
 
 pub use limits::{Format, Limits};
 
+use super::inertial_quality::InertialSummary;
 use super::{DecodeError, Header, Recording};
 use crate::body::Joint;
 use assembler::{Assembled, Assembler};
@@ -34,14 +37,17 @@ pub struct Inspection {
     pub format: Format,
     /// What was recorded, with what, of whom.
     pub header: Header,
-    /// Skeleton frames.
+    /// Skeleton frames; none in a recording of inertial units alone.
     pub n_frames: u64,
-    /// Time between the first and the last frame, seconds.
+    /// Time between the first and the last frame, seconds; without frames, that of the longest inertial unit.
     pub duration_s: f64,
     /// Joints of every frame.
     pub joints: Vec<Joint>,
     /// True when at least one joint of one frame has an orientation.
     pub has_orientations: bool,
+    /// The inertial units, with what is doubtful about their data.
+    #[serde(default)]
+    pub inertial_units: Vec<InertialSummary>,
     /// Names of the reference series.
     pub reference_channels: Vec<String>,
     /// Channels that were accepted and not read: reserved topics and those under `/x/`.
@@ -101,7 +107,7 @@ pub fn decode(mut reader: impl Read, format: Format, limits: &Limits) -> Result<
         }
     }
     let assembled = decoder.finish()?;
-    assembled.recording.ok_or_else(|| DecodeError::new("empty_recording", "the recording has no skeleton frame"))
+    assembled.recording.ok_or_else(|| DecodeError::new("empty_recording", "the recording has no data"))
 }
 
 enum Reader {

@@ -118,5 +118,5 @@ pub(super) fn recording_from(
         device: Device { model: Some("vicon".into()), middleware: Some("acclaim".into()) },
         ..Header::default()
     };
-    Ok(Recording { header, skeleton: Some(skeleton), references })
+    Ok(Recording { header, skeleton: Some(skeleton), inertial: None, references })
 }

@@ -100,5 +100,8 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         device: Device { model: Some("kinect-v2".into()), middleware: Some("kinect-sdk-2".into()) },
         ..Header::default()
     };
-    Ok(Trial { recording: Recording { header, skeleton: Some(skeleton), references: Vec::new() }, notes })
+    Ok(Trial {
+        recording: Recording { header, skeleton: Some(skeleton), inertial: None, references: Vec::new() },
+        notes,
+    })
 }

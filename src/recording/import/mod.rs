@@ -6,17 +6,27 @@
 //! than [`defects::MAX_JUMP_M`] between two frames was lost in the second.
 
 mod acclaim;
+mod broad;
 mod cmu;
 pub mod defects;
+#[cfg(test)]
+mod inertial_tests;
 mod keraal;
+mod knee_drop_cut;
+mod knee_sts;
+mod qmt_fullbody;
+mod repoimu;
 pub mod report;
+mod ring_chain;
 mod table;
 #[cfg(test)]
 mod tests;
 mod uiprmd;
+mod units;
 mod utdmhad;
+mod ximu_gait;
 
-pub use report::{Defects, ImportNotes, ImportReport};
+pub use report::{Defects, ImportNotes, ImportReport, UnitNotes};
 
 use super::Recording;
 use std::path::{Path, PathBuf};
@@ -32,11 +42,40 @@ pub enum Dataset {
     Keraal,
     /// CMU motion capture, subject 02: walking, exact angles of a fitted model.
     Cmu,
+    /// BROAD: one inertial unit in the hand, with its optical orientation.
+    Broad,
+    /// RepoIMU: one inertial unit on a rod, with the rod's optical orientation.
+    Repoimu,
+    /// A chain of five segments with hinges, a unit and the optical orientation of each.
+    RingChain,
+    /// Units on thigh and shank, sit to stand and sitting, with knee flexion from markers.
+    KneeSts,
+    /// Units on thigh and shank, drop landings and cutting, with knee flexion from Visual3D.
+    KneeDropCut,
+    /// Nine units on one person, without a reference.
+    QmtFullbody,
+    /// An x-IMU on a foot, without a reference.
+    XimuGait,
 }
 
 impl Dataset {
     /// Every data set.
-    pub const ALL: [Dataset; 4] = [Dataset::Uiprmd, Dataset::Utdmhad, Dataset::Keraal, Dataset::Cmu];
+    pub const ALL: [Dataset; 11] = [
+        Dataset::Uiprmd,
+        Dataset::Utdmhad,
+        Dataset::Keraal,
+        Dataset::Cmu,
+        Dataset::Broad,
+        Dataset::Repoimu,
+        Dataset::RingChain,
+        Dataset::KneeSts,
+        Dataset::KneeDropCut,
+        Dataset::QmtFullbody,
+        Dataset::XimuGait,
+    ];
+
+    /// The data sets with a skeleton.
+    pub const WITH_SKELETON: [Dataset; 4] = [Dataset::Uiprmd, Dataset::Utdmhad, Dataset::Keraal, Dataset::Cmu];
 
     /// Name on the command line and of its folder.
     pub fn name(self) -> &'static str {
@@ -45,6 +84,13 @@ impl Dataset {
             Dataset::Utdmhad => "utdmhad",
             Dataset::Keraal => "keraal",
             Dataset::Cmu => "cmu",
+            Dataset::Broad => "broad",
+            Dataset::Repoimu => "repoimu",
+            Dataset::RingChain => "ring_chain",
+            Dataset::KneeSts => "knee_sts",
+            Dataset::KneeDropCut => "knee_drop_cut",
+            Dataset::QmtFullbody => "qmt_fullbody",
+            Dataset::XimuGait => "ximu_gait",
         }
     }
 }
@@ -113,13 +159,18 @@ pub struct Trial {
 
 /// Trials of a data set at or below `directory`, sorted by name.
 ///
-/// `directory` may be the data set's own folder or one or two levels above (`uiprmd`, `skeleton/uiprmd`).
+/// `directory` may be the data set's own folder or one or two levels above (`uiprmd`, `skeleton/uiprmd`, `imu/broad`).
 ///
 /// # Errors
 /// [`ImportError::NotFound`] when there is none, [`ImportError::Unreadable`] when a folder cannot be listed.
 pub fn list(dataset: Dataset, directory: &Path) -> Result<Vec<Source>, ImportError> {
     let name = dataset.name();
-    for root in [directory.to_owned(), directory.join(name), directory.join("skeleton").join(name)] {
+    for root in [
+        directory.to_owned(),
+        directory.join(name),
+        directory.join("skeleton").join(name),
+        directory.join("imu").join(name),
+    ] {
         if !root.is_dir() {
             continue;
         }
@@ -128,6 +179,13 @@ pub fn list(dataset: Dataset, directory: &Path) -> Result<Vec<Source>, ImportErr
             Dataset::Utdmhad => utdmhad::list(&root)?,
             Dataset::Keraal => keraal::list(&root)?,
             Dataset::Cmu => cmu::list(&root)?,
+            Dataset::Broad => broad::list(&root)?,
+            Dataset::Repoimu => repoimu::list(&root)?,
+            Dataset::RingChain => ring_chain::list(&root)?,
+            Dataset::KneeSts => knee_sts::list(&root)?,
+            Dataset::KneeDropCut => knee_drop_cut::list(&root)?,
+            Dataset::QmtFullbody => qmt_fullbody::list(&root)?,
+            Dataset::XimuGait => ximu_gait::list(&root)?,
         };
         if !sources.is_empty() {
             sources.sort_by(|a, b| a.name.cmp(&b.name));
@@ -139,6 +197,13 @@ pub fn list(dataset: Dataset, directory: &Path) -> Result<Vec<Source>, ImportErr
         Dataset::Utdmhad => "expected a22_s1_t1_skeleton.csv and a22_s1_t1_inertial.csv",
         Dataset::Keraal => "expected G3-Kinect-….txt.gz",
         Dataset::Cmu => "expected 02.asf and 02_….amc",
+        Dataset::Broad => "expected 07_undisturbed_fast_rotation_B.csv.gz",
+        Dataset::Repoimu => "expected TStick_Test04_Trial1.csv",
+        Dataset::RingChain => "expected trial1_imu_rigid.csv and trial1_omc.csv",
+        Dataset::KneeSts => "expected partA_imu_left_thigh.csv.gz and its siblings",
+        Dataset::KneeDropCut => "expected Lknee_trial_271.txt and MT_…_left_thigh.txt",
+        Dataset::QmtFullbody => "expected part1_9segments.csv.gz",
+        Dataset::XimuGait => "expected straightLine_CalInertialAndMag.csv",
     };
     Err(ImportError::NotFound { dataset: name, directory: directory.to_owned(), expected })
 }
@@ -154,6 +219,13 @@ impl Source {
             Dataset::Utdmhad => utdmhad::read(self),
             Dataset::Keraal => keraal::read(self),
             Dataset::Cmu => cmu::read(self),
+            Dataset::Broad => broad::read(self),
+            Dataset::Repoimu => repoimu::read(self),
+            Dataset::RingChain => ring_chain::read(self),
+            Dataset::KneeSts => knee_sts::read(self),
+            Dataset::KneeDropCut => knee_drop_cut::read(self),
+            Dataset::QmtFullbody => qmt_fullbody::read(self),
+            Dataset::XimuGait => ximu_gait::read(self),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What importing did to each trial.
 
+use crate::recording::Segment;
 use serde::Serialize;
 
 /// Defects that were found and handled, counted in samples.
@@ -36,6 +37,20 @@ pub struct ClockOffset {
     pub is_determined: bool,
 }
 
+/// An inertial unit of a trial.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnitNotes {
+    /// What the unit is fixed to.
+    pub segment: Segment,
+    /// Samples.
+    pub n_samples: usize,
+    /// Mean rate, per second.
+    pub rate_hz: f64,
+    /// Doubts about its data, one sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+}
+
 /// What importing did to one trial.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ImportNotes {
@@ -49,6 +64,9 @@ pub struct ImportNotes {
     pub n_frames: usize,
     /// Mean frame rate, per second.
     pub frame_rate_hz: f64,
+    /// Inertial units.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inertial: Vec<UnitNotes>,
     /// Reference channels.
     pub references: Vec<String>,
     /// Lag between the clocks, where there is a reference on a clock of its own.
@@ -72,6 +90,8 @@ pub struct ImportReport {
     pub n_trials_with_reference: usize,
     /// Skeleton frames of all trials.
     pub n_frames: usize,
+    /// Samples of the inertial units of all trials.
+    pub n_inertial_samples: usize,
     /// Defects of all trials.
     pub defects: Defects,
     /// Every trial, sorted by name.
@@ -90,6 +110,7 @@ impl ImportReport {
             n_trials: trials.len(),
             n_trials_with_reference: trials.iter().filter(|trial| !trial.references.is_empty()).count(),
             n_frames: trials.iter().map(|trial| trial.n_frames).sum(),
+            n_inertial_samples: trials.iter().flat_map(|trial| &trial.inertial).map(|unit| unit.n_samples).sum(),
             defects,
             trials,
         }

@@ -2,6 +2,7 @@
 
 use super::ImportError;
 use flate2::read::MultiGzDecoder;
+use nalgebra::Vector3;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -45,9 +46,19 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads rows of exactly `n_columns` finite numbers that stand between commas or blanks; empty rows and the first
+    /// Reads rows of exactly `n_columns` finite numbers that stand between commas, semicolons or blanks; empty rows and the first
     /// `n_header` rows are passed over. `file` is only named in errors.
     pub(super) fn parse(text: &str, n_header: usize, n_columns: usize, file: &Path) -> Result<Self, ImportError> {
+        Self::parse_cells(text, n_header, n_columns, file, false)
+    }
+
+    fn parse_cells(
+        text: &str,
+        n_header: usize,
+        n_columns: usize,
+        file: &Path,
+        allows_nan: bool,
+    ) -> Result<Self, ImportError> {
         let mut values = Vec::new();
         for (i, row) in text.lines().enumerate().skip(n_header) {
             if row.trim().is_empty() {
@@ -55,9 +66,9 @@ impl Table {
             }
             let malformed = |reason| ImportError::Malformed { file: file.to_owned(), row: i + 1, reason };
             let start = values.len();
-            for cell in row.split(|c: char| c == ',' || c.is_whitespace()).filter(|cell| !cell.is_empty()) {
+            for cell in row.split(|c: char| matches!(c, ',' | ';') || c.is_whitespace()).filter(|c| !c.is_empty()) {
                 match cell.parse::<f64>() {
-                    Ok(value) if value.is_finite() => values.push(value),
+                    Ok(value) if value.is_finite() || (allows_nan && value.is_nan()) => values.push(value),
                     _ => {
                         let shown: String = cell.chars().take(32).collect();
                         return Err(malformed(format!("`{shown}` is not a finite number")));
@@ -92,5 +103,53 @@ impl Table {
     pub(super) fn n_zero_triples(&self) -> u64 {
         let zero = |triple: &&[f64]| triple.iter().all(|value| *value == 0.0);
         (0..self.n_rows()).map(|t| self.row(t).chunks_exact(3).filter(zero).count() as u64).sum()
+    }
+}
+
+/// Numbers of a text under a row of names; a missing number is `nan`.
+#[derive(Debug)]
+pub(super) struct NamedTable {
+    names: Vec<String>,
+    table: Table,
+    file: PathBuf,
+}
+
+impl NamedTable {
+    /// Reads a file whose names stand after `n_before` other rows, between commas or tabulators.
+    pub(super) fn read(file: &Path, n_before: usize) -> Result<Self, ImportError> {
+        let text = text_of(file)?;
+        let header = text.lines().nth(n_before).unwrap_or_default();
+        let names: Vec<String> = header.split([',', '\t']).map(|name| name.trim().to_owned()).collect();
+        let table = Table::parse_cells(&text, n_before + 1, names.len(), file, true)?;
+        Ok(Self { names, table, file: file.to_owned() })
+    }
+
+    pub(super) fn n_rows(&self) -> usize {
+        self.table.n_rows()
+    }
+
+    fn index(&self, name: &str) -> Result<usize, ImportError> {
+        self.names.iter().position(|known| known == name).ok_or_else(|| ImportError::Inconsistent {
+            file: self.file.clone(),
+            reason: format!("there is no column `{name}`"),
+        })
+    }
+
+    pub(super) fn column(&self, name: &str) -> Result<Vec<f64>, ImportError> {
+        Ok(self.table.column(self.index(name)?))
+    }
+
+    /// The named columns of every row.
+    pub(super) fn rows_of<const N: usize>(&self, names: [impl AsRef<str>; N]) -> Result<Vec<[f64; N]>, ImportError> {
+        let mut columns = [0; N];
+        for (column, name) in columns.iter_mut().zip(&names) {
+            *column = self.index(name.as_ref())?;
+        }
+        Ok((0..self.n_rows()).map(|i| columns.map(|column| self.table.row(i)[column])).collect())
+    }
+
+    /// Three named columns as vectors.
+    pub(super) fn vectors(&self, names: [impl AsRef<str>; 3]) -> Result<Vec<Vector3<f64>>, ImportError> {
+        Ok(self.rows_of(names)?.into_iter().map(Vector3::from).collect())
     }
 }

@@ -144,6 +144,7 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         references: references.iter().map(|reference| reference.channel.clone()).collect(),
         clock_offset,
         defects,
+        inertial: Vec::new(),
         remarks,
     };
     let header = Header {
@@ -151,7 +152,7 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         device: Device { model: Some("kinect-v2".into()), middleware: Some("ui-prmd-euler".into()) },
         ..Header::default()
     };
-    Ok(Trial { recording: Recording { header, skeleton: Some(skeleton), references }, notes })
+    Ok(Trial { recording: Recording { header, skeleton: Some(skeleton), inertial: None, references }, notes })
 }
 
 fn skeleton_from(positions: &Table, angles: &Table) -> SkeletonRecording {

@@ -4,6 +4,8 @@
 //! The skeleton has no time stamps and not the 30 frames/s of its sensor; both streams are taken as starting and ending
 //! together, so the frame rate is frames / inertial duration (50 samples/s).
 //!
+//! The unit's samples, sent in g and degrees per second, are the recording's inertial part.
+//!
 //! The reference is how far the thigh has tilted from its attitude at the start, `right_thigh_tilt_change_deg`: the
 //! angle between the direction of gravity in the sensor then and now. It needs no knowledge of how the sensor sat on
 //! the thigh. Gravity is carried along by the gyroscope and pulled towards the accelerometer:
@@ -15,9 +17,12 @@
 use super::defects::mark_lost;
 use super::report::ClockOffset;
 use super::table::{Table, existing};
+use super::units::{G_M_S2, sensor, unit_notes};
 use super::{Dataset, ImportError, ImportNotes, Source, Trial, file_names, regular_times};
 use crate::body::Joint;
-use crate::recording::{Device, Header, Recording, ReferenceSeries, SkeletonRecording};
+use crate::recording::{
+    Device, Header, InertialRecording, InertialSensor, Recording, ReferenceSeries, Segment, SkeletonRecording,
+};
 use crate::signal::alignment::{Pair, Search, estimate_lag};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -125,6 +130,7 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         values: tilt_change_deg(&inertial),
     };
     let clock_offset = align(&skeleton, &mut reference);
+    let unit = thigh_unit(&inertial, reference.clock_offset_ns);
     let notes = ImportNotes {
         name: source.name.clone(),
         dataset: source.dataset.name().to_owned(),
@@ -134,6 +140,7 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         references: vec![reference.channel.clone()],
         clock_offset,
         defects,
+        inertial: vec![unit_notes(&unit)],
         remarks: Vec::new(),
     };
     let header = Header {
@@ -141,7 +148,22 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
         device: Device { model: Some("kinect-v1".into()), middleware: Some("kinect-sdk-1".into()) },
         ..Header::default()
     };
-    Ok(Trial { recording: Recording { header, skeleton: Some(skeleton), references: vec![reference] }, notes })
+    let inertial = Some(InertialRecording { sensors: vec![unit] });
+    let recording = Recording { header, skeleton: Some(skeleton), inertial, references: vec![reference] };
+    Ok(Trial { recording, notes })
+}
+
+/// The unit on the right thigh, in SI, with the lag of the reference that was computed from it.
+fn thigh_unit(inertial: &Table, clock_offset_ns: i64) -> InertialSensor {
+    let time_ns = regular_times(inertial.n_rows(), INERTIAL_HZ);
+    let rows = || (0..inertial.n_rows()).map(|i| inertial.row(i));
+    let force: Vec<_> = rows().map(|row| Vector3::from_column_slice(&row[..3]) * G_M_S2).collect();
+    let rate: Vec<_> = rows().map(|row| Vector3::from_column_slice(&row[3..]).map(f64::to_radians)).collect();
+    InertialSensor {
+        nominal_rate_hz: Some(INERTIAL_HZ),
+        clock_offset_ns,
+        ..sensor(Segment::RightThigh, &time_ns, &force, &rate)
+    }
 }
 
 /// Angle between gravity at the start and gravity at each sample, in the sensor, degrees.

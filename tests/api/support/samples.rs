@@ -42,6 +42,7 @@ pub fn recording(n: usize) -> Recording {
             confidence: vec![1.0; n * posture.len()],
             orientations: Vec::new(),
         }),
+        inertial: None,
         references: Vec::new(),
     }
 }

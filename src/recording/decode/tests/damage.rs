@@ -5,8 +5,8 @@ use proptest::prelude::*;
 
 fn whole(format: Format) -> Vec<u8> {
     match format {
-        Format::Mcap => encode::mcap(&example()).expect("mcap"),
-        Format::Json => encode::json(&example()).expect("json"),
+        Format::Mcap => encode::mcap(&with_units()).expect("mcap"),
+        Format::Json => encode::json(&with_units()).expect("json"),
     }
 }
 
@@ -25,7 +25,7 @@ fn a_recording_cut_anywhere_is_refused_and_says_it_is_cut() {
 #[test]
 fn an_mcap_file_with_any_one_bit_flipped_is_refused_or_means_the_same() {
     let bytes = whole(Format::Mcap);
-    let sound = bits(&example());
+    let sound = bits(&with_units());
     let mut refused = 0;
     for i in 0..bytes.len() {
         for bit in 0..8 {

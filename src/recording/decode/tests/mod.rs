@@ -1,13 +1,14 @@
 //! Tests of the decoders, by subject.
 
 mod damage;
+mod inertial;
 mod json;
 mod mcap_file;
 mod round_trip;
 
 use super::*;
 use crate::recording::encode;
-use crate::recording::{ReferenceSeries, SkeletonRecording};
+use crate::recording::{InertialRecording, InertialSensor, ReferenceSeries, Segment, SkeletonRecording};
 use nalgebra::Vector3;
 
 /// A small recording: three joints, five frames, one lost joint, one reference series.
@@ -27,6 +28,7 @@ fn example() -> Recording {
     Recording {
         header: Header { protocol: Some("squat".into()), subject_height_m: Some(1.75), ..Header::default() },
         skeleton: Some(skeleton),
+        inertial: None,
         references: vec![ReferenceSeries {
             channel: "right_knee_flexion_deg".into(),
             source: "goniometer".into(),
@@ -35,6 +37,27 @@ fn example() -> Recording {
             values: vec![1.5, f64::NAN, -2.0],
         }],
     }
+}
+
+/// The same with two inertial units, one with a magnetometer and all that can be declared.
+fn with_units() -> Recording {
+    let mut thigh = InertialSensor::new(Segment::RightThigh);
+    thigh.device_model = Some("x-imu".into());
+    thigh.mounting = Some("strap, \"x\" down".into());
+    thigh.nominal_rate_hz = Some(256.0);
+    thigh.clock_offset_ns = -7;
+    thigh.magnetic_field = Some(Vec::new());
+    let mut chest = InertialSensor::new(Segment::Chest);
+    for i in 0..3 {
+        let wobble = 0.01 * f64::from(i);
+        for unit in [&mut thigh, &mut chest] {
+            unit.time_ns.push(i64::from(i) * 4_000_000 - 5);
+            unit.acceleration.push(Vector3::new(wobble, 9.81, -wobble));
+            unit.angular_rate.push(Vector3::new(0.1, -wobble, 0.0));
+        }
+        thigh.magnetic_field.as_mut().expect("a field").push(Vector3::new(20.0, -wobble, 43.0));
+    }
+    Recording { inertial: Some(InertialRecording { sensors: vec![thigh, chest] }), ..example() }
 }
 
 /// Every number to the last bit, NaN equal to NaN.

@@ -47,13 +47,46 @@ fn header() -> impl Strategy<Value = Header> {
 
 use crate::recording::Device;
 
+fn unit(segment: Segment) -> impl Strategy<Value = InertialSensor> {
+    let vector = |limit: f64| prop::array::uniform3(-limit..=limit).prop_map(Vector3::from);
+    // Shaken around gravity, so that the unit of the median is what it says.
+    let force = prop::array::uniform3(-3.0..3.0f64).prop_map(|v| Vector3::from(v) + Vector3::new(0.0, 9.81, 0.0));
+    let samples = prop::collection::vec((1..1_000_000_000i64, force, vector(100.0), vector(10_000.0)), 0..200);
+    let declared = (prop::option::of("[a-z \",é]{0,64}"), prop::option::of(1e-3..1e5f64), any::<i32>());
+    (samples, declared, any::<bool>()).prop_map(move |(samples, (text, rate, offset), has_field)| {
+        let mut unit = InertialSensor::new(segment);
+        (unit.device_model, unit.mounting) = (text.clone(), text);
+        (unit.nominal_rate_hz, unit.clock_offset_ns) = (rate, offset.into());
+        let mut time = -1_000_000_000;
+        for (step, force, rate, field) in samples {
+            time += step;
+            unit.time_ns.push(time);
+            unit.acceleration.push(force);
+            unit.angular_rate.push(rate);
+            if has_field {
+                unit.magnetic_field.get_or_insert_default().push(field);
+            }
+        }
+        unit
+    })
+}
+
+/// No unit, or up to three.
+fn inertial() -> impl Strategy<Value = Option<InertialRecording>> {
+    let units = [Segment::LeftForearm, Segment::Chest, Segment::Object5].map(unit);
+    (units, 0..=3usize).prop_map(|(units, n)| {
+        let sensors: Vec<InertialSensor> = units.into_iter().take(n).collect();
+        (n > 0).then_some(InertialRecording { sensors })
+    })
+}
+
 /// Any recording in the form that decoding gives: what is lost keeps nothing.
 fn recording() -> impl Strategy<Value = Recording> {
     (1..Joint::ALL.len(), 2..12usize, any::<bool>()).prop_flat_map(|(n_joints, n_frames, with_orientations)| {
         let samples = prop::collection::vec(joint_sample(), n_joints * n_frames);
         let steps = prop::collection::vec(1..1_000_000_000i64, n_frames);
-        (samples, steps, header(), prop::option::of(reference())).prop_map(
-            move |(samples, steps, header, reference)| {
+        (samples, steps, header(), prop::option::of(reference()), inertial()).prop_map(
+            move |(samples, steps, header, reference, inertial)| {
                 let mut skeleton =
                     SkeletonRecording { joints: Joint::ALL[..n_joints].to_vec(), ..SkeletonRecording::default() };
                 let mut time = -1;
@@ -71,7 +104,7 @@ fn recording() -> impl Strategy<Value = Recording> {
                 if !with_orientations || skeleton.orientations.iter().all(Option::is_none) {
                     skeleton.orientations.clear();
                 }
-                Recording { header, skeleton: Some(skeleton), references: reference.into_iter().collect() }
+                Recording { header, skeleton: Some(skeleton), inertial, references: reference.into_iter().collect() }
             },
         )
     })
@@ -90,6 +123,13 @@ proptest! {
             prop_assert_eq!(bits(&back), bits(&recording));
             let inspection = inspect(&bytes, format, piece).expect("sound");
             let skeleton = back.skeleton.expect("skeleton");
+            let units = back.inertial.iter().flat_map(|inertial| &inertial.sensors);
+            prop_assert_eq!(units.clone().count(), inspection.inertial_units.len());
+            for (unit, summary) in units.zip(&inspection.inertial_units) {
+                prop_assert_eq!((unit.segment, unit.len() as u64), (summary.segment, summary.n_samples));
+                prop_assert_eq!(unit.duration_s(), summary.duration_s);
+                prop_assert_eq!(unit.magnetic_field.is_some(), summary.has_magnetic_field);
+            }
             prop_assert_eq!(inspection.n_frames as usize, skeleton.len());
             prop_assert_eq!(inspection.duration_s, skeleton.duration_s());
             prop_assert_eq!(inspection.has_orientations, !skeleton.orientations.is_empty());
@@ -108,6 +148,10 @@ fn encoding_twice_gives_the_same_bytes() {
 fn the_embedded_schemas_accept_what_is_written_and_refuse_what_is_refused() {
     let skeleton: serde_json::Value = serde_json::from_str(encode::SKELETON_SCHEMA).expect("json");
     let reference: serde_json::Value = serde_json::from_str(encode::REFERENCE_SCHEMA).expect("json");
+    let inertial: serde_json::Value = serde_json::from_str(encode::INERTIAL_SCHEMA).expect("json");
+    let batch = serde_json::json!({"time_ns": [1], "acceleration": [[0, 9.8, 0]], "angular_rate": [[0, 0, 1]]});
+    assert!(jsonschema::is_valid(&inertial, &batch));
+    assert!(!jsonschema::is_valid(&inertial, &serde_json::json!({"time_ns": [1], "acceleration": [[0, 9.8, 0]]})));
     let document: serde_json::Value = serde_json::from_slice(&encode::json(&example()).expect("json")).expect("json");
     let mut frame = document["frames"][2].clone();
     frame.as_object_mut().expect("object").remove("time_ns");
@@ -121,6 +165,10 @@ fn the_embedded_schemas_accept_what_is_written_and_refuse_what_is_refused() {
 #[test]
 fn a_recording_that_mcap_cannot_hold_is_refused_by_the_encoder() {
     assert!(matches!(encode::mcap(&Recording::default()), Err(encode::EncodeError::Unsuitable(_))));
+    let mut uneven = with_units();
+    uneven.inertial.as_mut().expect("units").sensors[1].angular_rate.pop();
+    assert!(matches!(encode::mcap(&uneven), Err(encode::EncodeError::Unsuitable(_))));
+    assert!(matches!(encode::json(&uneven), Err(encode::EncodeError::Unsuitable(_))));
     let mut early = example();
     early.skeleton.as_mut().expect("skeleton").time_ns[0] = -1;
     assert!(matches!(encode::mcap(&early), Err(encode::EncodeError::Unsuitable(_))));
