@@ -3,6 +3,7 @@
 //! A model says how its state moves and how likely an observation is; a driver here does the rest. Log-weights
 //! throughout; scratch memory is allocated once.
 
+pub mod orientation_filter;
 pub mod particle_filter;
 pub mod random;
 pub mod rate_smoother;
