@@ -4,6 +4,7 @@
 //! throughout; scratch memory is allocated once.
 
 pub mod guided_filter;
+pub mod orientation_filter;
 pub mod particle_filter;
 pub mod random;
 pub mod rate_dynamics;

@@ -5,6 +5,7 @@ pub mod contender;
 pub mod error_analysis;
 pub mod figures;
 pub mod joint_angles;
+pub mod orientation;
 pub mod overview;
 pub mod reference;
 pub mod rows;

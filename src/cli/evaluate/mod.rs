@@ -2,6 +2,7 @@
 
 mod document;
 mod noise;
+mod orientation;
 mod sources;
 mod table;
 mod verdict_table;
@@ -33,6 +34,8 @@ pub struct Args {
 enum What {
     /// Joint angles against gold-standard angles, real or simulated
     JointAngles(JointAngleArgs),
+    /// Orientation filters of inertial units against optical orientation
+    Orientation(orientation::OrientationArgs),
 }
 
 /// Compare methods with the reference angles of every importable trial below a directory, or of simulated exercises.
@@ -104,6 +107,7 @@ struct JointAngleArgs {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.what {
         What::JointAngles(args) => joint_angles(args, &mut std::io::stdout().lock()),
+        What::Orientation(args) => orientation::run(args, &mut std::io::stdout().lock()),
     }
 }
 

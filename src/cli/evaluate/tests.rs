@@ -11,7 +11,7 @@ struct Command {
 
 fn output_of(words: &[&str]) -> anyhow::Result<String> {
     let args = Command::try_parse_from(["evaluate", "joint-angles"].iter().chain(words))?.args;
-    let What::JointAngles(args) = args.what;
+    let What::JointAngles(args) = args.what else { panic!("not joint angles") };
     let mut out = Vec::new();
     joint_angles(&args, &mut out)?;
     Ok(String::from_utf8(out)?)
@@ -88,7 +88,7 @@ fn table_2_runs_every_contender_on_every_sensor_and_says_the_same_twice() {
 
 fn plan_of(words: &[&str]) -> anyhow::Result<Plan> {
     let args = Command::try_parse_from(["evaluate", "joint-angles"].iter().chain(words))?.args;
-    let What::JointAngles(args) = args.what;
+    let What::JointAngles(args) = args.what else { panic!("not joint angles") };
     plan(&args)
 }
 

@@ -11,7 +11,7 @@ use super::topic::{Topic, required, topic};
 use crate::recording::{DecodeError, Device, Header};
 use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Name of the metadata record, and of the profile, that make an MCAP file a recording.
 const PROFILE: &str = "surefoot";

@@ -1,11 +1,11 @@
 //! BROAD: one inertial unit on a rigid body in the hand, with the optical orientation of that body.
 //!
-//! Both are aligned and synchronised by the authors. The earth frame has z up; the reference is turned to y up.
+//! Both are aligned and synchronised by the authors, who also say by 1 in the channel `movement` where a sample counts. The earth frame has z up; the reference is turned to y up.
 
 use super::table::NamedTable;
 use super::units::{orientation, orientation_references, sensor, trial, trials, y_up_from_z_up};
 use super::{Dataset, ImportError, Source, Trial, regular_times};
-use crate::recording::Segment;
+use crate::recording::{ReferenceSeries, Segment};
 use std::path::Path;
 
 /// Samples per second: one in 3.5 ms.
@@ -29,6 +29,14 @@ pub(super) fn read(source: &Source) -> Result<Trial, ImportError> {
     unit.device_model = Some("myon-aktos-t".into());
     let optical = table.rows_of(["opt_qw", "opt_qx", "opt_qy", "opt_qz"])?;
     let orientations: Vec<_> = optical.iter().map(|q| Some(y_up_from_z_up() * orientation(q)?)).collect();
-    let references = orientation_references(Segment::Object1, "optitrack", 0, &time_ns, &orientations);
+    let mut references = orientation_references(Segment::Object1, "optitrack", 0, &time_ns, &orientations);
+    let movement = table.rows_of(["movement"])?.into_iter().map(|[moves]| moves).collect();
+    references.push(ReferenceSeries {
+        channel: "movement".into(),
+        source: "authors".into(),
+        clock_offset_ns: 0,
+        time_ns: time_ns.clone(),
+        values: movement,
+    });
     trial(source, vec![unit], RATE_HZ, references, Vec::new())
 }
