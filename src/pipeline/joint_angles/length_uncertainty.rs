@@ -67,7 +67,9 @@ mod tests {
     fn frames_that_repeat_each_other_count_once_for_each_stretch() {
         // Four stretches of one second with the values 1, 3, 1, 3: s² = 4/3, over 4 stretches.
         let of = |frames: usize| -> Vec<(f64, f64)> {
-            (0..4 * frames).map(|i| (i as f64 / frames as f64, if i / frames % 2 == 0 { 1.0 } else { 3.0 })).collect()
+            (0..4 * frames)
+                .map(|i| (i as f64 / frames as f64, if (i / frames).is_multiple_of(2) { 1.0 } else { 3.0 }))
+                .collect()
         };
         let expected = (4.0_f64 / 3.0 / 4.0).sqrt();
         for frames in [1, 10, 100] {
