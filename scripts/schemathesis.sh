@@ -86,7 +86,7 @@ check() {
     config=$1
     shift
     "$venv/bin/schemathesis" --config-file "$root/scripts/$config" run "$address/openapi.json" --seed "$SEED" \
-        --max-examples "$EXAMPLES" --generation-database none --workers 2 --continue-on-failure "$@" && return
+        --max-examples "$EXAMPLES" --generation-database none --workers 1 --continue-on-failure "$@" && return
     echo "the service's log ends with:" >&2
     tail -n 40 "$work/log" >&2
     exit 1
