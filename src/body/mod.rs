@@ -7,12 +7,14 @@
 //! equals `subject` in the reference posture: the T-posture (arms lateral, palms forward, legs down).
 
 pub mod anatomical_angles;
+pub mod bones;
 pub mod joint;
 pub mod kinematics;
 pub mod pose;
 pub mod range_of_motion;
 pub mod skeleton;
 
+pub use bones::{BONE_COUNT, Bone};
 pub use joint::{Joint, Side};
 pub use pose::{POSE_DIMENSION, Pose};
 pub use skeleton::{Limb, OBSERVATION_DIMENSION, POINT_COUNT, Skeleton};

@@ -4,6 +4,7 @@
 //! rotation vector (unit axis × angle, radians).
 
 pub mod attitude;
+pub mod camera;
 pub mod euler;
 pub mod lanes;
 pub mod three_point;

@@ -1,5 +1,6 @@
 //! Inertial units in memory: what each measured, and what it sat on.
 
+use crate::body::{Bone, Limb};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -60,6 +61,29 @@ segments! {
     Object4 = "object4",
     /// Fifth object.
     Object5 = "object5",
+}
+
+impl Segment {
+    /// The bone of the linked skeleton that the segment is; none for pelvis, feet and objects, which it does not have.
+    pub fn bone(self) -> Option<Bone> {
+        Some(match self {
+            Segment::Chest => Bone::Trunk,
+            Segment::LeftUpperArm => Bone::Proximal(Limb::LeftArm),
+            Segment::LeftForearm => Bone::Distal(Limb::LeftArm),
+            Segment::RightUpperArm => Bone::Proximal(Limb::RightArm),
+            Segment::RightForearm => Bone::Distal(Limb::RightArm),
+            Segment::LeftThigh => Bone::Proximal(Limb::LeftLeg),
+            Segment::LeftShank => Bone::Distal(Limb::LeftLeg),
+            Segment::RightThigh => Bone::Proximal(Limb::RightLeg),
+            Segment::RightShank => Bone::Distal(Limb::RightLeg),
+            _ => return None,
+        })
+    }
+
+    /// The segment of a bone.
+    pub fn of_bone(bone: Bone) -> Segment {
+        Segment::ALL.iter().copied().find(|segment| segment.bone() == Some(bone)).unwrap_or(Segment::Chest)
+    }
 }
 
 /// A name that is not a segment's.
@@ -166,6 +190,13 @@ mod tests {
         for &segment in Segment::ALL {
             assert_eq!(segment.name().parse(), Ok(segment));
             assert_eq!(serde_json::json!(segment), serde_json::json!(segment.name()));
+        }
+    }
+
+    #[test]
+    fn every_bone_has_a_segment() {
+        for bone in Bone::ALL {
+            assert_eq!(Segment::of_bone(bone).bone(), Some(bone));
         }
     }
 
