@@ -137,6 +137,11 @@ impl ParticleFilter {
         }
     }
 
+    /// Moments after the last frame.
+    pub fn moments(&self) -> &Moments {
+        &self.moments
+    }
+
     /// One frame: propagate, weight by the observation when there is one, resample. Allocates nothing.
     pub fn step<M: ParticleModel>(
         &mut self,

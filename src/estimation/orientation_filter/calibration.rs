@@ -26,8 +26,8 @@ use std::ops::Range;
 const BLOCK_SECONDS: f64 = 0.05;
 /// Time over which drift is linear in any bias that counts as one, s: 2 °/s turn 20° in it.
 const LINEAR_SECONDS: f64 = 10.0;
-/// Passes over the whole drift; the second moves the orientation by less than 0.01° on every recording that was tried.
-const PASSES: usize = 2;
+/// Passes over the whole drift; a second moves no set of recordings by more than 0.01°.
+const PASSES: usize = 1;
 /// Nothing is known of gravity beforehand, m/s²; this keeps the equations definite.
 const GRAVITY_SD: f64 = 1e3;
 
@@ -141,8 +141,9 @@ pub(super) fn calibrate(samples: &[Sample], rests: &[Rest], settings: &SmootherS
             normal.add_single(index, 0.0, GRAVITY_SD);
         }
         for rest in rests {
+            let sd = settings.rate_bias_at_rest_sd.hypot(rest.rate_sd);
             for axis in 0..3 {
-                normal.add_single(axis, rest.rate[axis] - parameters[axis], settings.rate_bias_at_rest_sd);
+                normal.add_single(axis, rest.rate[axis] - parameters[axis], sd);
             }
         }
         let Some((increment, covariance)) = normal.solve() else { break };
@@ -199,7 +200,7 @@ fn summed(samples: &[Sample], ranges: &[Range<usize>], calibration: &SensorCalib
                 *gain += weighted * *rate;
             }
             seconds += sample.seconds;
-            if sample.has_gravity() {
+            if sample.is_force {
                 force_sum += rotation * calibration.true_force(&sample.acceleration, &rate);
                 delay_sum += rotation * rate.cross(&sample.acceleration);
                 n += 1.0;

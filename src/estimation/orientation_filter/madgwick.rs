@@ -56,7 +56,7 @@ fn step(q: &Quaternion<f64>, sample: &Sample, gain: f64) -> Quaternion<f64> {
 
 /// `∇f / ‖∇f‖` of Eqs. 2-4; none where it has no direction.
 fn gradient(q: &Quaternion<f64>, sample: &Sample) -> Option<Quaternion<f64>> {
-    let a = sample.acceleration.try_normalize(0.0)?;
+    let a = sample.has_gravity().then(|| sample.acceleration.normalize())?;
     let (q1, q2, q3, q4) = (q.w, q.i, q.j, q.k);
     let fx = 2.0 * (q2 * q4 - q1 * q3) - a.x;
     let fy = 2.0 * (q1 * q2 + q3 * q4) - a.y;

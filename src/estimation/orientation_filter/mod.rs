@@ -30,9 +30,12 @@ mod zero_phase;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::fmt;
+use std::str::FromStr;
+use utoipa::ToSchema;
 
 /// A method that estimates orientation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OrientationMethod {
     /// Integration of the gyroscope alone, from the inclination of the first acceleration.
@@ -58,6 +61,25 @@ impl OrientationMethod {
             Self::Vqf => "vqf",
             Self::Smoother => "smoother",
         }
+    }
+}
+
+/// An orientation filter that does not exist.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no orientation filter; there are gyroscope, madgwick, vqf and smoother")]
+pub struct UnknownOrientationMethod(pub String);
+
+impl FromStr for OrientationMethod {
+    type Err = UnknownOrientationMethod;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Self::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| UnknownOrientationMethod(name.to_owned()))
+    }
+}
+
+impl fmt::Display for OrientationMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 

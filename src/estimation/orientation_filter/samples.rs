@@ -17,14 +17,17 @@ pub(super) struct Sample {
     pub seconds: f64,
     /// Angular rate, rad/s, finite.
     pub rate: Vector3<f64>,
-    /// Acceleration, m/s²; zero when it says nothing about gravity.
+    /// Specific force, m/s²; zero where it was not measured.
     pub acceleration: Vector3<f64>,
+    /// True where the force was measured. In free fall it was, and is almost zero: it then shows no direction, but a mean
+    /// over a jump is only right with it.
+    pub is_force: bool,
 }
 
 impl Sample {
     /// True when the acceleration says something about gravity.
     pub(super) fn has_gravity(&self) -> bool {
-        self.acceleration != Vector3::zeros()
+        self.is_force && self.acceleration.norm_squared() > MIN_ACCELERATION * MIN_ACCELERATION
     }
 }
 
@@ -49,8 +52,7 @@ pub(super) fn safe(samples: &InertialSamples<'_>) -> Result<Vec<Sample>, Orienta
         if rate.norm_squared() < MAX_RATE * MAX_RATE {
             last_rate = *rate;
         }
-        let magnitude = acceleration.norm_squared();
-        let usable = magnitude > MIN_ACCELERATION * MIN_ACCELERATION && magnitude < MAX_ACCELERATION * MAX_ACCELERATION;
+        let is_force = acceleration.norm_squared() < MAX_ACCELERATION * MAX_ACCELERATION;
         safe.push(Sample {
             seconds: match (i, time_ns.len()) {
                 (0, 1) => 0.0,
@@ -58,7 +60,8 @@ pub(super) fn safe(samples: &InertialSamples<'_>) -> Result<Vec<Sample>, Orienta
                 _ => seconds(i),
             },
             rate: last_rate,
-            acceleration: if usable { *acceleration } else { Vector3::zeros() },
+            acceleration: if is_force { *acceleration } else { Vector3::zeros() },
+            is_force,
         });
     }
     Ok(safe)

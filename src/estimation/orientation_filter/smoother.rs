@@ -21,13 +21,15 @@ use std::ops::Range;
 /// What is known beforehand of a sensor, and over which times gravity is sought. One set serves all sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SmootherSettings {
-    /// Standard deviation of the gyroscope's bias, rad/s. Default 0.5 °/s, as VQF has it.
+    /// Standard deviation of the gyroscope's bias, rad/s. Default 1 °/s, the offset of an uncalibrated one.
     pub rate_bias_sd: f64,
-    /// Standard deviation of the mean rate of a rest about the bias, rad/s. Default 0.01 °/s.
+    /// Standard deviation of the true mean rate of a rest about the bias, rad/s; the noise of the samples comes on top.
+    /// Default 0.01 °/s.
     pub rate_bias_at_rest_sd: f64,
     /// Standard deviation of the gyroscope's gains about one, and of its axes about square, rad/rad. Default 0.0005.
     pub rate_gain_sd: f64,
-    /// Standard deviation of the accelerometer's bias, m/s². Default 0.1, 10 mg.
+    /// Standard deviation of the accelerometer's bias, m/s². Default 0.03: 3 mg, one calibrated
+    /// by its maker.
     pub acceleration_bias_sd: f64,
     /// Standard deviation of the gyroscope's lateness beside the accelerometer, s. Default 0.01.
     pub rate_delay_sd: f64,
@@ -37,22 +39,22 @@ pub struct SmootherSettings {
     pub calibration_time_constant: f64,
     /// Time constant of the low-pass that shows gravity, s. Default 3, as VQF has it.
     pub inclination_time_constant: f64,
-    /// Time for which a sensor's errors are constant, s. Default 300; between windows they change linearly.
+    /// Time for which a sensor's errors are constant, s. Default 600; between windows they change linearly.
     pub window: f64,
 }
 
 impl Default for SmootherSettings {
     fn default() -> Self {
         Self {
-            rate_bias_sd: 0.5_f64.to_radians(),
+            rate_bias_sd: 1.0_f64.to_radians(),
             rate_bias_at_rest_sd: 0.01_f64.to_radians(),
             rate_gain_sd: 0.0005,
-            acceleration_bias_sd: 0.1,
+            acceleration_bias_sd: 0.03,
             rate_delay_sd: 0.01,
             acceleration_sd: 0.4,
             calibration_time_constant: 1.5,
             inclination_time_constant: 3.0,
-            window: 300.0,
+            window: 600.0,
         }
     }
 }
@@ -179,7 +181,7 @@ impl Integration {
                 self.attitude = turned(&self.attitude, &turn(&before, &rate, sample.seconds));
             }
             self.before = Some(rate);
-            if sample.has_gravity() {
+            if sample.is_force {
                 let force = calibration.true_force(&sample.acceleration, &rate);
                 sum += UnitQuaternion::new_unchecked(self.attitude) * force;
                 n += 1.0;

@@ -16,9 +16,13 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 /// Squared half angle (rad²) below which the series of sine and cosine is exact to 1e-13.
 const SERIES_LIMIT: f64 = 0.1;
 
+/// Coefficients of `x`, `x²`, … in `sin √x / √x` and `cos √x`: ±1/3!, 1/5!, … and ±1/2!, 1/4!, …
+const SINE: [f64; 5] = [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0];
+const COSINE: [f64; 5] = [-1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0];
+
 /// The turn from the sample before to this one, as an attitude vector, rad.
 pub(super) fn turn(before: &Vector3<f64>, rate: &Vector3<f64>, seconds: f64) -> Vector3<f64> {
-    (before + rate) * (0.5 * seconds) + before.cross(rate) * (seconds * seconds / 12.0)
+    (before + rate) * (0.5 * seconds) + before.cross(rate) * (seconds * seconds * (1.0 / 12.0))
 }
 
 /// `attitude ⊗ exp(turn)`, normalised to first order: a step leaves the norm within 1e-13 of one.
@@ -26,8 +30,8 @@ pub(super) fn turned(attitude: &Quaternion<f64>, turn: &Vector3<f64>) -> Quatern
     let x = 0.25 * turn.norm_squared();
     let (sine, cosine) = if x < SERIES_LIMIT {
         (
-            1.0 - x / 6.0 * (1.0 - x / 20.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0 * (1.0 - x / 110.0)))),
-            1.0 - x / 2.0 * (1.0 - x / 12.0 * (1.0 - x / 30.0 * (1.0 - x / 56.0 * (1.0 - x / 90.0)))),
+            1.0 + x * (SINE[0] + x * (SINE[1] + x * (SINE[2] + x * (SINE[3] + x * SINE[4])))),
+            1.0 + x * (COSINE[0] + x * (COSINE[1] + x * (COSINE[2] + x * (COSINE[3] + x * COSINE[4])))),
         )
     } else {
         let half = x.sqrt();

@@ -26,7 +26,8 @@ pub(super) fn estimate(samples: &InertialSamples<'_>) -> Result<OrientationEstim
         before = Some(sample.rate);
         filter.update_gyr_with_ts(mean.into(), sample.seconds);
         // The crate takes three zeros as no acceleration.
-        filter.update_acc(sample.acceleration.into());
+        let acceleration = if sample.has_gravity() { sample.acceleration } else { Vector3::zeros() };
+        filter.update_acc(acceleration.into());
         let q = filter.quat_6d();
         let attitude = UnitQuaternion::new_unchecked(Quaternion::new(q.0, q.1, q.2, q.3));
         let (bias, sd) = filter.bias_estimate();
