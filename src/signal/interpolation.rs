@@ -1,5 +1,8 @@
 //! Values between samples.
 
+/// Nanoseconds in a second.
+pub const NS_PER_S: f64 = 1e9;
+
 /// Value at `at_ns` on the straight line between the two samples around it; NaN outside the series and beside a
 /// missing value.
 ///
