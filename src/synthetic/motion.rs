@@ -19,6 +19,39 @@ pub fn pulse(rise: [f64; 2], fall: [f64; 2], t: f64) -> f64 {
     between(rise[0], rise[1], t) - between(fall[0], fall[1], t)
 }
 
+/// Course of fifth order between two instants whose place, velocity and acceleration are given at both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quintic {
+    start_s: f64,
+    coefficients: [f64; 6],
+}
+
+impl Quintic {
+    /// From one state (place, velocity per second, acceleration per second squared) at `start_s` to another at `end_s`.
+    pub fn between(start_s: f64, from: [f64; 3], end_s: f64, to: [f64; 3]) -> Self {
+        let d = end_s - start_s;
+        let [p, v, a] = from;
+        let ahead = [p + v * d + a * d * d / 2.0, v + a * d, a];
+        let place = to[0] - ahead[0];
+        let velocity = (to[1] - ahead[1]) * d;
+        let acceleration = (to[2] - ahead[2]) * d * d / 2.0;
+        let coefficients = [
+            p,
+            v,
+            a / 2.0,
+            (10.0 * place - 4.0 * velocity + acceleration) / d.powi(3),
+            (-15.0 * place + 7.0 * velocity - 2.0 * acceleration) / d.powi(4),
+            (6.0 * place - 3.0 * velocity + acceleration) / d.powi(5),
+        ];
+        Self { start_s, coefficients }
+    }
+
+    /// Place at `t` seconds.
+    pub fn at(&self, t: f64) -> f64 {
+        self.coefficients.iter().rev().fold(0.0, |sum, c| sum * (t - self.start_s) + c)
+    }
+}
+
 /// Repetitions one after the other, as many whole ones as fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
@@ -102,6 +135,19 @@ mod tests {
         assert_eq!(schedule.at(5.5), Some((1, 0.25)));
         assert_eq!(schedule.at(9.1), None);
         assert_eq!(Schedule::filling(3.0, 1.0, 2.0).count, 0);
+    }
+
+    #[test]
+    fn a_quintic_meets_both_states() {
+        let (from, to) = ([-0.2, 0.3, 1.0], [0.1, 1.5, -9.81]);
+        let course = Quintic::between(2.0, from, 2.4, to);
+        let h = 1e-4;
+        for (t, [place, velocity, acceleration]) in [(2.0, from), (2.4, to)] {
+            assert!((course.at(t) - place).abs() < 1e-12);
+            assert!(((course.at(t + h) - course.at(t - h)) / (2.0 * h) - velocity).abs() < 1e-4);
+            let second = (course.at(t + h) - 2.0 * course.at(t) + course.at(t - h)) / (h * h);
+            assert!((second - acceleration).abs() < 1e-3, "{second}");
+        }
     }
 
     #[test]

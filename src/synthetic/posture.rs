@@ -90,6 +90,8 @@ pub struct Posture {
     pub pelvis: [f64; 2],
     /// Height of the middle of the hips on a seat, and how far (0 to 1) the body sits on it.
     pub seat: (f64, f64),
+    /// How far the pelvis is above the height to which the supporting legs hold it, metres; negative in a crouch.
+    pub rise: f64,
     /// The arms.
     pub arms: [Arm; 2],
     /// The legs.
@@ -114,7 +116,7 @@ impl Posture {
             [Limb::LeftLeg, Limb::RightLeg].map(|leg| trunk * (skeleton.offsets[leg.index()] - middle));
         let standing = self.standing_height(skeleton, &hip_from_pelvis);
         let (seat, seated) = self.seat;
-        let height = standing + (seat - standing) * seated;
+        let height = standing + (seat - standing) * seated + self.rise;
         let pelvis = Vector3::new(self.pelvis[0], height, self.pelvis[1]);
 
         let mut pose = Pose { trunk, ..Pose::reference() };

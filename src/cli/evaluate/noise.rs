@@ -13,7 +13,7 @@ impl FromStr for Noise {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         if text == "all" {
-            return Ok(Self(Preset::ALL.to_vec()));
+            return Ok(Self(Preset::OF_JOINT_ANGLES.to_vec()));
         }
         let given = text.split(',').map(str::parse).collect::<Result<Vec<Preset>, _>>()?;
         Ok(Self(Preset::ALL.into_iter().filter(|preset| given.contains(preset)).collect()))
@@ -27,7 +27,7 @@ mod tests {
     #[test]
     fn several_presets_or_all_are_taken_once_each_and_unknown_ones_refused() {
         assert_eq!("failures,clean,failures".parse(), Ok(Noise(vec![Preset::Clean, Preset::Failures])));
-        assert_eq!("all".parse(), Ok(Noise(Preset::ALL.to_vec())));
+        assert_eq!("all".parse(), Ok(Noise(Preset::OF_JOINT_ANGLES.to_vec())));
         assert!("table1,".parse::<Noise>().is_err() && "fog".parse::<Noise>().is_err());
     }
 }

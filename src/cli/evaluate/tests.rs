@@ -99,11 +99,11 @@ fn table_2_takes_everything_unless_a_part_is_named() {
     let real = plan_of(&["--table2", "--data", directory]).unwrap();
     assert!(real.data.is_some() && real.noise.is_empty());
     let simulated = plan_of(&["--table2", "--simulated"]).unwrap();
-    assert_eq!((simulated.data, &simulated.noise[..], simulated.seeds), (None, &Preset::ALL[..], 6));
+    assert_eq!((simulated.data, &simulated.noise[..], simulated.seeds), (None, &Preset::OF_JOINT_ANGLES[..], 6));
     let both = plan_of(&["--table2", "--data", directory, "--simulated", "--noise", "clean"]).unwrap();
     assert!(both.data.is_some() && both.noise == [Preset::Clean]);
     let whole = plan_of(&["--table2"]).unwrap();
-    assert_eq!(whole.noise, Preset::ALL);
+    assert_eq!(whole.noise, Preset::OF_JOINT_ANGLES);
     assert_eq!(whole.contenders, Contender::table2(&[128, 512, 2048]));
 }
 

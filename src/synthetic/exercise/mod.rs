@@ -21,10 +21,10 @@ use std::str::FromStr;
 pub const REST_S: f64 = 2.0;
 
 /// Time in which the arms come down, seconds.
-const ARMS_DOWN_S: f64 = 1.4;
+pub const ARMS_DOWN_S: f64 = 1.4;
 
 /// Quiet time before the end, seconds.
-const END_S: f64 = 0.3;
+pub const END_S: f64 = 0.3;
 
 /// One of the paper's five exercises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -59,12 +59,17 @@ impl Exercise {
 
     /// The body at `t` seconds of an exercise that lasts `duration_s`.
     pub fn stance(self, subject: &Subject, duration_s: f64, t: f64) -> Stance {
+        let active = ActiveTime { start_s: REST_S + ARMS_DOWN_S, end_s: duration_s - END_S };
+        self.posture(subject, active, t).stand(&subject.skeleton)
+    }
+
+    /// What the exercise asks of the body at `t` seconds, when it may move in a given time only.
+    pub(in crate::synthetic) fn posture(self, subject: &Subject, active: ActiveTime, t: f64) -> Posture {
         let sway = match self {
             Exercise::NearTandem => near_tandem::SWAY,
             _ => 1.0,
         };
         let mut posture = standing(subject, sway, t);
-        let active = ActiveTime { start_s: REST_S + ARMS_DOWN_S, end_s: duration_s - END_S };
         match self {
             Exercise::BackKnee => back_knee::shape(&mut posture, subject, active, t),
             Exercise::SitFrontKnee => sit_front_knee::shape(&mut posture, subject, active, t),
@@ -72,7 +77,7 @@ impl Exercise {
             Exercise::Step => step::shape(&mut posture, subject, active, t),
             Exercise::NearTandem => near_tandem::shape(&mut posture, subject, active, t),
         }
-        posture.stand(&subject.skeleton)
+        posture
     }
 }
 
@@ -97,13 +102,13 @@ impl fmt::Display for Exercise {
 
 /// Time in which an exercise may move, seconds.
 #[derive(Debug, Clone, Copy)]
-struct ActiveTime {
-    start_s: f64,
-    end_s: f64,
+pub(in crate::synthetic) struct ActiveTime {
+    pub(in crate::synthetic) start_s: f64,
+    pub(in crate::synthetic) end_s: f64,
 }
 
 /// Sign of a side along Z.
-fn outward(side: Side) -> f64 {
+pub(in crate::synthetic) fn outward(side: Side) -> f64 {
     if side == Side::Left { -1.0 } else { 1.0 }
 }
 
@@ -111,7 +116,7 @@ fn outward(side: Side) -> f64 {
 ///
 /// Root mean square of the sway is `sway` times the values here, but a tenth of them while the subject holds still for the
 /// calibration.
-fn standing(subject: &Subject, sway: f64, t: f64) -> Posture {
+pub(in crate::synthetic) fn standing(subject: &Subject, sway: f64, t: f64) -> Posture {
     /// Breathing: 15 breaths a minute that tip the trunk by a quarter of a degree.
     const BREATH_HZ: f64 = 0.25;
     const BREATH_DEG: f64 = 0.25;
@@ -148,6 +153,7 @@ fn standing(subject: &Subject, sway: f64, t: f64) -> Posture {
         },
         pelvis: [wander_m(Habit::PelvisForward, 0.006), wander_m(Habit::PelvisRight, 0.005)],
         seat: (0.0, 0.0),
+        rise: 0.0,
         arms: Side::BOTH.map(arm),
         legs: Side::BOTH.map(leg),
     }

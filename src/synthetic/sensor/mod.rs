@@ -7,6 +7,7 @@ pub mod dropout;
 pub mod episode;
 pub mod hand_jump;
 pub mod limb_swap;
+pub mod occlusion;
 pub mod orientation;
 pub mod posture_offset;
 pub mod white_noise;
@@ -35,13 +36,20 @@ pub enum Preset {
     Table1,
     /// A Kinect v2: little jitter, but an offset that follows the posture.
     KinectV2,
+    /// A Kinect v2 with the offsets that are measured for every joint: 30 to 45 mm that stay and 20 to 30 mm that
+    /// follow the posture.
+    KinectOffset,
     /// The paper's noise with lost joints, jumping hands, exchanged limbs and missing frames.
     Failures,
 }
 
 impl Preset {
     /// Every preset, the gentlest first.
-    pub const ALL: [Preset; 4] = [Preset::Clean, Preset::Table1, Preset::KinectV2, Preset::Failures];
+    pub const ALL: [Preset; 5] =
+        [Preset::Clean, Preset::Table1, Preset::KinectV2, Preset::KinectOffset, Preset::Failures];
+
+    /// The presets that joint angles from a skeleton alone are measured with.
+    pub const OF_JOINT_ANGLES: [Preset; 4] = [Preset::Clean, Preset::Table1, Preset::KinectV2, Preset::Failures];
 
     /// Name in commands and as the recording's device.
     pub fn name(self) -> &'static str {
@@ -49,6 +57,7 @@ impl Preset {
             Preset::Clean => "clean",
             Preset::Table1 => "table1",
             Preset::KinectV2 => "kinect-v2",
+            Preset::KinectOffset => "kinect-offset",
             Preset::Failures => "failures",
         }
     }
@@ -56,14 +65,21 @@ impl Preset {
     /// The joints that the sensor reports: those of NITE, or of the Kinect v2 without its finger tips and toes.
     pub fn joints(self) -> Vec<Joint> {
         let mut joints = match self {
-            Preset::KinectV2 => vec![Joint::Head, Joint::Neck, Joint::SpineShoulder, Joint::Torso, Joint::Pelvis],
+            Preset::KinectV2 | Preset::KinectOffset => {
+                vec![Joint::Head, Joint::Neck, Joint::SpineShoulder, Joint::Torso, Joint::Pelvis]
+            }
             _ => vec![Joint::Head, Joint::Neck, Joint::Torso],
         };
         for limb in Limb::ALL {
             let names = limb.joints();
-            joints.extend(names.iter().map(|(kinect, nite)| if self == Preset::KinectV2 { *kinect } else { *nite }));
+            joints.extend(names.iter().map(|(kinect, nite)| if self.is_kinect() { *kinect } else { *nite }));
         }
         joints
+    }
+
+    /// True of a Kinect v2, whose legs end at the ankle and arms at the wrist.
+    fn is_kinect(self) -> bool {
+        matches!(self, Preset::KinectV2 | Preset::KinectOffset)
     }
 
     /// Stretches without frames.
@@ -76,7 +92,9 @@ impl Preset {
         let flips = |per_s| Episodes { per_s, shortest_s: 0.2, longest_s: 3.0 };
         match self {
             Preset::Clean => None,
-            Preset::KinectV2 => Some(OrientationNoise { sd_deg: 3.0, axial_sd_deg: 12.0, flips: flips(0.01) }),
+            Preset::KinectV2 | Preset::KinectOffset => {
+                Some(OrientationNoise { sd_deg: 3.0, axial_sd_deg: 12.0, flips: flips(0.01) })
+            }
             Preset::Table1 => Some(OrientationNoise { sd_deg: 5.0, axial_sd_deg: 20.0, flips: flips(0.04) }),
             Preset::Failures => Some(OrientationNoise { sd_deg: 6.0, axial_sd_deg: 25.0, flips: flips(0.08) }),
         }
@@ -92,11 +110,15 @@ impl Preset {
             Preset::Table1 | Preset::Failures => {
                 white_noise::add(skeleton, white_noise::table1_sd_mm, &mut stream(seed, Stream::WhiteNoise));
             }
-            Preset::KinectV2 => {
+            Preset::KinectV2 | Preset::KinectOffset => {
                 /// Frame-to-frame jitter of a Kinect v2, millimetres.
                 const JITTER_MM: f64 = 1.0;
                 let mut rng = stream(seed, Stream::PostureOffset);
-                posture_offset::add(skeleton, thetas, posture_offset::kinect_v2_size, &mut rng);
+                let size = match self {
+                    Preset::KinectOffset => posture_offset::every_joint_size,
+                    _ => posture_offset::kinect_v2_size,
+                };
+                posture_offset::add(skeleton, thetas, size, &mut rng);
                 let jitter = |_| Vector3::repeat(JITTER_MM);
                 white_noise::add(skeleton, jitter, &mut stream(seed, Stream::WhiteNoise));
             }
@@ -111,7 +133,7 @@ impl Preset {
 
 /// A name that no preset has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is not a noise preset; there are clean, table1, kinect-v2 and failures")]
+#[error("`{0}` is not a noise preset; there are clean, table1, kinect-v2, kinect-offset and failures")]
 pub struct UnknownPreset(pub String);
 
 impl FromStr for Preset {
@@ -138,6 +160,11 @@ pub(super) enum Stream {
     HandJump = 6,
     LimbSwap = 7,
     Orientation = 8,
+    Occlusion = 9,
+    Jumps = 10,
+    Plank = 11,
+    /// First of the streams of inertial units, see [`unit_stream`].
+    Units = 1000,
 }
 
 pub(super) fn stream(seed: u64, stream: Stream) -> ChaCha8Rng {
@@ -146,8 +173,30 @@ pub(super) fn stream(seed: u64, stream: Stream) -> ChaCha8Rng {
     rng
 }
 
+/// Random stream of one kind of error of the inertial unit with a number.
+pub(super) fn unit_stream(seed: u64, unit: usize, kind: UnitError) -> ChaCha8Rng {
+    /// More than there are kinds.
+    const KINDS: u64 = 16;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(Stream::Units as u64 + KINDS * unit as u64 + kind as u64);
+    rng
+}
+
+/// Kinds of an inertial unit's errors that draw at random.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum UnitError {
+    Mounting = 0,
+    Handling = 1,
+    Clock = 2,
+    Gyroscope = 3,
+    Accelerometer = 4,
+    Scale = 5,
+    Gaps = 6,
+    Shock = 7,
+}
+
 /// Three independent standard normal numbers.
-fn standard_normals(rng: &mut impl Rng) -> Vector3<f64> {
+pub(super) fn standard_normals(rng: &mut impl Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| rng.sample(StandardNormal))
 }
 

@@ -47,6 +47,19 @@ pub fn kinect_v2_size(joint: Joint) -> OffsetSize {
     OffsetSize { constant_mm, posture_mm }
 }
 
+/// Sizes for every joint of a Kinect v2 against motion capture, the torso's too: 30 mm (roots of limbs) to 45 mm (their
+/// ends) that stay, 20 to 30 mm that follow the posture.
+pub fn every_joint_size(joint: Joint) -> OffsetSize {
+    let level =
+        Limb::ALL.into_iter().find_map(|limb| limb.joints().iter().position(|(a, b)| *a == joint || *b == joint));
+    let (constant_mm, posture_mm) = match level {
+        Some(2) => (45.0, 30.0),
+        Some(1) => (38.0, 25.0),
+        _ => (30.0, 20.0),
+    };
+    OffsetSize { constant_mm, posture_mm }
+}
+
 /// Error of one joint as a function of the posture.
 struct JointError {
     constant: Vector3<f64>,
