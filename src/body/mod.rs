@@ -1,4 +1,4 @@
-//! The human body as a model: joints, the linked skeleton, ranges of motion, anatomical angles.
+//! The human body as a model: joints, the linked skeleton, ranges of motion, anatomical angles, a pair of legs.
 //!
 //! # Frames
 //!
@@ -10,6 +10,7 @@ pub mod anatomical_angles;
 pub mod bones;
 pub mod joint;
 pub mod kinematics;
+pub mod legs;
 pub mod pose;
 pub mod range_of_motion;
 pub mod skeleton;

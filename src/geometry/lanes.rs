@@ -1,8 +1,9 @@
 //! Elementary functions of a register of `f32` numbers, for every width of register.
 //!
 //! Callers implement [`pulp::WithSimd`] and go through [`pulp::Arch::dispatch`], which picks the widest instruction set
-//! at run time. Each lane is computed by itself and no fused multiply-add is used, so every instruction set gives the
-//! same bits, whatever its width. Slices come in whole groups of [`LANES`] numbers.
+//! at run time. Each lane is computed by itself, and multiplication and addition are fused only where [`Lanes::mul_add`]
+//! says so, on every instruction set; so all of them give the same bits, whatever their width. Slices come in whole groups
+//! of [`LANES`] numbers.
 
 use pulp::Simd;
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
@@ -31,10 +32,42 @@ impl<S: Simd> Lanes<S> {
         Self::new(simd, simd.splat_f32s(value))
     }
 
+    /// A point's coordinates, the same in each lane.
+    #[inline(always)]
+    pub fn splat_point(simd: S, point: &[f32; 3]) -> [Self; 3] {
+        [Self::splat(simd, point[0]), Self::splat(simd, point[1]), Self::splat(simd, point[2])]
+    }
+
     /// Square root.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
         Self::new(self.simd, self.simd.sqrt_f32s(self.values))
+    }
+
+    /// `self · factor + term`, rounded once. Without the instruction (older than AVX2) it is computed in software, slowly.
+    #[inline(always)]
+    pub fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self::new(self.simd, self.simd.mul_add_f32s(self.values, factor.values, term.values))
+    }
+
+    /// Absolute value.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        // `abs_f32s` is not inlined.
+        let magnitude = self.simd.and_u32s(self.to_bits(), self.simd.splat_u32s(0x7fff_ffff));
+        Self::from_bits(self.simd, magnitude)
+    }
+
+    /// The smaller of two numbers, neither of them NaN.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.min_f32s(self.values, other.values))
+    }
+
+    /// The larger of two numbers, neither of them NaN.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.max_f32s(self.values, other.values))
     }
 
     /// The numbers whose bits these are.
