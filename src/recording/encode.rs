@@ -1,13 +1,13 @@
 //! Recording → bytes, in both formats; the same recording always gives the same bytes.
 
-use super::{InertialSensor, Recording, ReferenceSeries, Segment, SkeletonRecording};
+use super::{Header, InertialSensor, Recording, ReferenceSeries, Segment, SkeletonRecording};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::io::Cursor;
+use std::io::{Cursor, Seek, Write};
 
 /// Samples of a reference batch: a few seconds at usual rates.
 const BATCH: usize = 512;
@@ -24,6 +24,9 @@ pub const SKELETON_SCHEMA: &str = include_str!("schema/skeleton.json");
 /// JSON schema of a `/reference/…` message, embedded in every file.
 pub const REFERENCE_SCHEMA: &str = include_str!("schema/reference.json");
 
+/// Message encoding of `/depth` and `/depth/background`.
+pub const DEPTH_ENCODING: &str = "surefoot.depth";
+
 /// Why a recording has no encoding.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeError {
@@ -33,6 +36,9 @@ pub enum EncodeError {
     /// The container's writer failed.
     #[error("the container cannot be written: {0}")]
     Container(#[from] mcap::McapError),
+    /// A compressor failed.
+    #[error("an image cannot be written: {0}")]
+    Compression(#[from] std::io::Error),
     /// A value has no JSON.
     #[error("a message cannot be written: {0}")]
     Json(#[from] serde_json::Error),
@@ -49,14 +55,8 @@ pub fn mcap(recording: &Recording) -> Result<Vec<u8>, EncodeError> {
     if first_ns.is_some_and(|first| *first < 0) {
         return Err(EncodeError::Unsuitable("its first time stamp is negative"));
     }
-    let mut writer = WriteOptions::new()
-        .profile("surefoot")
-        .library(concat!("surefoot ", env!("CARGO_PKG_VERSION")))
-        .compression(Some(Compression::Zstd))
-        // Threads would change how the stream is cut, and with it the bytes.
-        .compression_threads(0)
-        .create(Cursor::new(Vec::new()))?;
-    writer.write_metadata(&Metadata { name: "surefoot".into(), metadata: header(recording)? })?;
+    let mut writer = options(Some(Compression::Zstd)).create(Cursor::new(Vec::new()))?;
+    write_header(&mut writer, &recording.header)?;
 
     if let Some(skeleton) = &recording.skeleton {
         write_skeleton(&mut writer, skeleton)?;
@@ -64,11 +64,37 @@ pub fn mcap(recording: &Recording) -> Result<Vec<u8>, EncodeError> {
     if let Some(inertial) = &recording.inertial {
         write_inertial(&mut writer, &inertial.sensors)?;
     }
-    let schema = match recording.references.is_empty() {
+    write_references(&mut writer, &recording.references)?;
+    writer.finish()?;
+    Ok(writer.into_inner().into_inner())
+}
+
+/// The rules that every file follows.
+pub(super) fn options(compression: Option<Compression>) -> WriteOptions {
+    WriteOptions::new()
+        .profile("surefoot")
+        .library(concat!("surefoot ", env!("CARGO_PKG_VERSION")))
+        .compression(compression)
+        // Threads would change how the stream is cut, and with it the bytes.
+        .compression_threads(0)
+}
+
+/// Writes the metadata record that makes a file a recording.
+pub(super) fn write_header<W: Write + Seek>(writer: &mut mcap::Writer<W>, header: &Header) -> Result<(), EncodeError> {
+    writer.write_metadata(&Metadata { name: "surefoot".into(), metadata: header_fields(header)? })?;
+    Ok(())
+}
+
+/// Writes reference series, each on its own channel.
+pub(super) fn write_references<W: Write + Seek>(
+    writer: &mut mcap::Writer<W>,
+    references: &[ReferenceSeries],
+) -> Result<(), EncodeError> {
+    let schema = match references.is_empty() {
         true => None,
         false => Some(writer.add_schema("surefoot.reference", "jsonschema", REFERENCE_SCHEMA.as_bytes())?),
     };
-    for reference in &recording.references {
+    for reference in references {
         let metadata = BTreeMap::from([
             ("source".to_owned(), reference.source.clone()),
             ("clock_offset_ns".to_owned(), reference.clock_offset_ns.to_string()),
@@ -86,8 +112,7 @@ pub fn mcap(recording: &Recording) -> Result<Vec<u8>, EncodeError> {
             )?;
         }
     }
-    writer.finish()?;
-    Ok(writer.into_inner().into_inner())
+    Ok(())
 }
 
 type File = mcap::Writer<Cursor<Vec<u8>>>;
@@ -173,7 +198,7 @@ struct Document<'a> {
     format: &'static str,
     version: u32,
     coordinates: BTreeMap<&'static str, &'static str>,
-    header: &'a super::Header,
+    header: &'a Header,
     #[serde(skip_serializing_if = "Option::is_none")]
     joints: Option<&'a [crate::body::Joint]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -293,8 +318,7 @@ fn numbers(values: &[f64]) -> Vec<Option<f64>> {
 }
 
 /// The `surefoot` metadata record.
-fn header(recording: &Recording) -> Result<BTreeMap<String, String>, EncodeError> {
-    let header = &recording.header;
+fn header_fields(header: &Header) -> Result<BTreeMap<String, String>, EncodeError> {
     let start_time = header.start_time.map(|time| time.format(&time::format_description::well_known::Rfc3339));
     let start_time =
         start_time.transpose().map_err(|_| EncodeError::Unsuitable("its start time has no RFC 3339 form"))?;

@@ -28,22 +28,25 @@ impl DecodeError {
 }
 
 /// Every code of a [`DecodeError`], sorted; `docs/recording-format.md` says what each means.
-pub const DECODE_CODES: [&str; 37] = [
+pub const DECODE_CODES: [&str; 40] = [
     "acceleration_unit",
     "angular_rate_unit",
     "bad_quaternion",
     "checksum_mismatch",
     "confidence_out_of_range",
     "decompression_limit",
+    "depth_size",
     "duplicate_channel",
     "duplicate_joint",
     "empty_recording",
+    "invalid_depth",
     "invalid_json",
     "invalid_mcap",
     "invalid_value",
     "joint_count_mismatch",
     "missing_field",
     "missing_header",
+    "misplaced_message",
     "not_a_recording",
     "not_finite",
     "position_out_of_range",

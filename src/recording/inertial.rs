@@ -1,7 +1,7 @@
 //! Inertial units in memory: what each measured, and what it sat on.
 
 use crate::body::{Bone, Limb};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -84,6 +84,18 @@ impl Segment {
     pub fn of_bone(bone: Bone) -> Segment {
         Segment::ALL.iter().copied().find(|segment| segment.bone() == Some(bone)).unwrap_or(Segment::Chest)
     }
+}
+
+/// Name of the mounting of \[fusion\] in [`InertialSensor::mounting`]: the unit sits as [`Bone::scheme_from_imu`] says,
+/// within what a hand and an eye can do.
+pub const MOUNTING_SCHEME: &str = "scheme";
+
+/// `world_from_imu` of every unit while the units lie on the plank at the start (\[fusion\], initialization).
+///
+/// The plank lies level before the camera, each unit with its top (z) up and its x to the right as the camera sees it; y
+/// then points towards the camera. `world` has x to the right, y up and z away from the camera.
+pub fn world_from_plank() -> Rotation3<f64> {
+    Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[Vector3::x(), -Vector3::z(), Vector3::y()]))
 }
 
 /// A name that is not a segment's.
@@ -191,6 +203,16 @@ mod tests {
             assert_eq!(segment.name().parse(), Ok(segment));
             assert_eq!(serde_json::json!(segment), serde_json::json!(segment.name()));
         }
+    }
+
+    #[test]
+    fn on_the_plank_z_is_up_x_to_the_right_and_y_towards_the_camera() {
+        let turn = world_from_plank();
+        assert_eq!(
+            [turn * Vector3::x(), turn * Vector3::y(), turn * Vector3::z()],
+            [Vector3::x(), -Vector3::z(), Vector3::y()]
+        );
+        assert_eq!(turn.matrix().determinant(), 1.0);
     }
 
     #[test]

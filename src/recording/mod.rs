@@ -5,6 +5,7 @@
 
 pub mod coordinates;
 pub mod decode;
+pub mod depth;
 pub mod encode;
 pub mod error;
 pub mod import;

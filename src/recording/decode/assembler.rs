@@ -1,6 +1,7 @@
 //! Values in, recording out: everything that both formats check, one frame at a time.
 
 use super::checks::{MAX_TEXT, check_counts, check_segment_lengths, checked_sample};
+use super::depth::DepthAssembler;
 use super::inertial::InertialAssembler;
 use super::limits::{Format, Limits};
 use super::message::{FrameMessage, List};
@@ -25,7 +26,7 @@ pub(super) struct Assembled {
 pub(super) struct Assembler {
     keep: bool,
     limits: Limits,
-    header: Option<(Header, Coordinates)>,
+    pub(super) header: Option<(Header, Coordinates)>,
     joints: Option<Vec<Joint>>,
     skeleton: SkeletonRecording,
     n_frames: u64,
@@ -37,6 +38,8 @@ pub(super) struct Assembler {
     ignored: BTreeMap<String, u64>,
     /// The inertial units, checked apart.
     pub(super) inertial: InertialAssembler,
+    /// The depth images, checked apart.
+    pub(super) depth: DepthAssembler,
 }
 
 struct Reference {
@@ -49,6 +52,7 @@ impl Assembler {
         Self {
             keep,
             inertial: InertialAssembler::new(limits.clone(), keep),
+            depth: DepthAssembler::new(limits.clone()),
             limits,
             header: None,
             joints: None,
@@ -300,9 +304,9 @@ impl Assembler {
             return Err(DecodeError::new("missing_header", sentence));
         };
         match self.n_frames {
-            0 if !self.inertial.has_samples() => {
-                let sentence = "the recording has neither a skeleton frame nor an inertial sample; send `/skeleton` or \
-                                `/inertial/…`";
+            0 if !self.inertial.has_samples() && !self.depth.has_images() => {
+                let sentence = "the recording has neither a skeleton frame nor an inertial sample nor a depth image; send \
+                                `/skeleton`, `/inertial/…` or `/depth`";
                 return Err(DecodeError::new("empty_recording", sentence));
             }
             1 => {
@@ -313,15 +317,18 @@ impl Assembler {
         }
         let (inertial_units, inertial) = self.inertial.finish()?;
         let has_skeleton = self.n_frames > 0;
-        let longest_unit_s = inertial_units.iter().map(|unit| unit.duration_s).fold(0.0, f64::max);
+        let depth = self.depth.finish()?;
+        let unit_durations_s = inertial_units.iter().map(|unit| unit.duration_s);
+        let longest_s = unit_durations_s.fold(self.depth.duration_s(), f64::max);
         let inspection = Inspection {
             format,
             header: header.clone(),
             n_frames: self.n_frames,
-            duration_s: if has_skeleton { (self.last_ns - self.first_ns) as f64 * 1e-9 } else { longest_unit_s },
+            duration_s: if has_skeleton { (self.last_ns - self.first_ns) as f64 * 1e-9 } else { longest_s },
             joints: self.joints.filter(|_| has_skeleton).unwrap_or_default(),
             has_orientations: self.has_orientations,
             inertial_units,
+            depth,
             reference_channels: self.references.iter().map(|known| known.series.channel.clone()).collect(),
             ignored_channels: self
                 .ignored

@@ -67,6 +67,8 @@ pub struct Limits {
     pub max_chunk_bytes: usize,
     /// Bytes of all MCAP chunks together after decompression; default 4 GiB.
     pub max_decompressed_bytes: u64,
+    /// Bytes of all depth images together after decompression; default 64 GiB: an hour of 640 × 480 at 30 images/s.
+    pub max_depth_bytes: u64,
     /// MCAP channels; default 256.
     pub max_channels: usize,
 }
@@ -81,6 +83,7 @@ impl Default for Limits {
             max_json_bytes: 32 << 20,
             max_chunk_bytes: 16 << 20,
             max_decompressed_bytes: 4 << 30,
+            max_depth_bytes: 64 << 30,
             max_channels: 256,
         }
     }

@@ -232,6 +232,7 @@ impl Content {
                     .map_err(|error| defect_in_json(message.data, &error, &place))?;
                 assembler.inertial.batch(*number, batch.into_samples(), &place)
             }
+            Topic::Depth(topic) => assembler.depth.message(*topic, message.log_time, message.data),
             Topic::Ignored(topic) => {
                 assembler.ignore(topic);
                 Ok(())

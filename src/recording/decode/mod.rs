@@ -7,6 +7,8 @@
 mod assembler;
 mod checks;
 mod chunk;
+mod depth;
+mod depth_reader;
 mod inertial;
 mod json;
 mod json_error;
@@ -18,8 +20,10 @@ mod record;
 mod tests;
 mod topic;
 
+pub use depth_reader::DepthReader;
 pub use limits::{Format, Limits};
 
+use super::depth::DepthSummary;
 use super::inertial_quality::InertialSummary;
 use super::{DecodeError, Header, Recording};
 use crate::body::Joint;
@@ -37,9 +41,10 @@ pub struct Inspection {
     pub format: Format,
     /// What was recorded, with what, of whom.
     pub header: Header,
-    /// Skeleton frames; none in a recording of inertial units alone.
+    /// Skeleton frames; none in a recording of inertial units or of depth images alone.
     pub n_frames: u64,
-    /// Time between the first and the last frame, seconds; without frames, that of the longest inertial unit.
+    /// Time between the first and the last frame, seconds; without frames, that of the depth images or of
+    /// the longest inertial unit.
     pub duration_s: f64,
     /// Joints of every frame.
     pub joints: Vec<Joint>,
@@ -48,9 +53,12 @@ pub struct Inspection {
     /// The inertial units, with what is doubtful about their data.
     #[serde(default)]
     pub inertial_units: Vec<InertialSummary>,
+    /// The depth images, with what is doubtful about them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<DepthSummary>,
     /// Names of the reference series.
     pub reference_channels: Vec<String>,
-    /// Channels that were accepted and not read: reserved topics and those under `/x/`.
+    /// Channels that were accepted and not read: those under `/x/`.
     pub ignored_channels: Vec<IgnoredChannel>,
 }
 

@@ -1,6 +1,7 @@
 //! Topics of an MCAP recording: what a channel's name and metadata declare.
 
 use super::assembler::Assembler;
+use super::depth::DepthTopic;
 use super::inertial::Declaration;
 use super::record::Channel;
 use crate::recording::DecodeError;
@@ -14,6 +15,7 @@ pub(super) enum Topic {
     Skeleton,
     Reference { number: usize, n_batches: u64 },
     Inertial { number: usize, n_batches: u64 },
+    Depth(DepthTopic),
     Ignored(String),
 }
 
@@ -25,8 +27,11 @@ pub(super) fn topic(channel: &Channel<'_>, assembler: &mut Assembler) -> Result<
         let sentence = format!("a topic has {} bytes, at most {MAX_TOPIC} are accepted", name.len());
         return Err(DecodeError::new("unknown_topic", sentence).at(place));
     }
-    let is_reserved = matches!(name, "/depth" | "/depth/calibration" | "/depth/background");
-    if is_reserved || name.starts_with("/x/") {
+    if let Some(topic) = DepthTopic::of_channel(channel)? {
+        assembler.depth.declare(topic, name)?;
+        return Ok(Topic::Depth(topic));
+    }
+    if name.starts_with("/x/") {
         return Ok(Topic::Ignored(name.to_owned()));
     }
     let reference = name.strip_prefix("/reference/");

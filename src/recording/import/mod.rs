@@ -9,6 +9,7 @@ mod acclaim;
 mod broad;
 mod cmu;
 pub mod defects;
+mod depth;
 #[cfg(test)]
 mod inertial_tests;
 mod keraal;
@@ -26,6 +27,7 @@ mod units;
 mod utdmhad;
 mod ximu_gait;
 
+pub use depth::{CameraFile, DepthImportError, RawImages, import_depth};
 pub use report::{Defects, ImportNotes, ImportReport, UnitNotes};
 
 use super::Recording;

@@ -1,6 +1,7 @@
 //! Tests of the decoders, by subject.
 
 mod damage;
+mod depth;
 mod inertial;
 mod json;
 mod mcap_file;

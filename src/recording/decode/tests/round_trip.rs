@@ -52,7 +52,9 @@ fn unit(segment: Segment) -> impl Strategy<Value = InertialSensor> {
     // Shaken around gravity, so that the unit of the median is what it says.
     let force = prop::array::uniform3(-3.0..3.0f64).prop_map(|v| Vector3::from(v) + Vector3::new(0.0, 9.81, 0.0));
     let samples = prop::collection::vec((1..1_000_000_000i64, force, vector(100.0), vector(10_000.0)), 0..200);
-    let declared = (prop::option::of("[a-z \",é]{0,64}"), prop::option::of(1e-3..1e5f64), any::<i32>());
+    // Not a range of floats: over eight decades proptest's own sampler of them trips over its rounding now and then.
+    let rate = (1..100_000_000_u32).prop_map(|thousandths| f64::from(thousandths) * 1e-3);
+    let declared = (prop::option::of("[a-z \",é]{0,64}"), prop::option::of(rate), any::<i32>());
     (samples, declared, any::<bool>()).prop_map(move |(samples, (text, rate, offset), has_field)| {
         let mut unit = InertialSensor::new(segment);
         (unit.device_model, unit.mounting) = (text.clone(), text);
