@@ -7,12 +7,17 @@
 
 pub mod clock;
 pub mod exercise;
+pub mod inertial;
 pub mod motion;
+pub mod movement;
 pub mod posture;
 pub mod sensor;
 pub mod subject;
+pub mod walker;
 
 pub use exercise::Exercise;
+pub use inertial::{FusionSimulation, FusionTruth, simulate_fusion};
+pub use movement::Movement;
 pub use sensor::Preset;
 pub use subject::Subject;
 
@@ -20,7 +25,7 @@ use crate::assessment::AngleChannel;
 use crate::body::anatomical_angles::{ANGLE_COUNT, angles_of_pose};
 use crate::body::kinematics::forward_kinematics;
 use crate::body::pose::PoseVector;
-use crate::body::{Joint, Pose};
+use crate::body::{Joint, Pose, Skeleton};
 use crate::recording::{Device, Header, Recording, ReferenceSeries, SkeletonRecording};
 use nalgebra::{Rotation3, Vector3};
 use posture::Stance;
@@ -120,15 +125,15 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Simulation, SettingOutO
         .map(|time| settings.exercise.stance(&subject, settings.duration_s, *time as f64 * 1e-9))
         .collect();
 
-    let mut skeleton = true_skeleton(settings, &subject, time_ns, &stances);
-    let mut thetas: Vec<PoseVector> = Vec::with_capacity(stances.len());
-    for stance in &stances {
-        let theta = stance.pose.to_vector(thetas.last().unwrap_or(&PoseVector::zeros()));
-        thetas.push(theta);
-    }
+    let scene = Scene {
+        sensor: settings.sensor,
+        skeleton: &subject.skeleton,
+        stature_m: settings.stature_m,
+        yaw_deg: settings.yaw_deg,
+    };
     let poses: Vec<Pose> = stances.iter().map(|stance| stance.pose.clone()).collect();
-    settings.sensor.disturb(&mut skeleton, &poses, &thetas, settings.seed);
-
+    let thetas = continuous_thetas(&poses);
+    let skeleton = scene.record(time_ns, &stances, &poses, &thetas, settings.seed);
     let header = Header {
         protocol: Some(settings.exercise.name().to_owned()),
         device: Device {
@@ -149,28 +154,61 @@ pub fn world_from_subject(yaw_deg: f64) -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Vector3::y_axis(), FRAC_PI_2 + yaw_deg.to_radians())
 }
 
-/// What a sensor without any error records.
-fn true_skeleton(
-    settings: &SimulationSettings,
-    subject: &Subject,
-    time_ns: Vec<i64>,
-    stances: &[Stance],
-) -> SkeletonRecording {
-    let joints: Vec<Joint> = settings.sensor.joints();
-    let turn = world_from_subject(settings.yaw_deg);
-    let origin = Vector3::new(0.0, -SENSOR_HEIGHT_M, DISTANCE_M);
-    let mut positions = Vec::with_capacity(joints.len() * stances.len());
-    let mut orientations = Vec::with_capacity(joints.len() * stances.len());
-    for stance in stances {
-        let points = forward_kinematics(&subject.skeleton, &stance.pose);
-        positions.extend(joints.iter().map(|joint| {
-            let from_torso = sensor::true_position(*joint, &points, &stance.pose, settings.stature_m);
-            origin + turn * (stance.torso + from_torso)
-        }));
-        orientations.extend(sensor::orientation::world_from_joints(&joints, &stance.pose, &turn));
+/// State vectors of successive postures, attitude vectors on continuous branches.
+fn continuous_thetas(poses: &[Pose]) -> Vec<PoseVector> {
+    let mut thetas: Vec<PoseVector> = Vec::with_capacity(poses.len());
+    for pose in poses {
+        thetas.push(pose.to_vector(thetas.last().unwrap_or(&PoseVector::zeros())));
     }
-    let confidence = vec![1.0; positions.len()];
-    SkeletonRecording { joints, time_ns, positions, confidence, orientations }
+    thetas
+}
+
+/// The place on the floor where the subject first stands, in `world`, metres.
+fn standing_place() -> Vector3<f64> {
+    Vector3::new(0.0, -SENSOR_HEIGHT_M, DISTANCE_M)
+}
+
+/// A subject before a sensor.
+struct Scene<'a> {
+    sensor: Preset,
+    skeleton: &'a Skeleton,
+    stature_m: f64,
+    yaw_deg: f64,
+}
+
+impl Scene<'_> {
+    /// What the sensor records of a subject in some stances.
+    fn record(
+        &self,
+        time_ns: Vec<i64>,
+        stances: &[Stance],
+        poses: &[Pose],
+        thetas: &[PoseVector],
+        seed: u64,
+    ) -> SkeletonRecording {
+        let mut recorded = self.true_skeleton(time_ns, stances);
+        self.sensor.disturb(&mut recorded, poses, thetas, seed);
+        recorded
+    }
+
+    /// What a sensor without any error records.
+    fn true_skeleton(&self, time_ns: Vec<i64>, stances: &[Stance]) -> SkeletonRecording {
+        let joints: Vec<Joint> = self.sensor.joints();
+        let turn = world_from_subject(self.yaw_deg);
+        let origin = standing_place();
+        let mut positions = Vec::with_capacity(joints.len() * stances.len());
+        let mut orientations = Vec::with_capacity(joints.len() * stances.len());
+        for stance in stances {
+            let points = forward_kinematics(self.skeleton, &stance.pose);
+            positions.extend(joints.iter().map(|joint| {
+                let from_torso = sensor::true_position(*joint, &points, &stance.pose, self.stature_m);
+                origin + turn * (stance.torso + from_torso)
+            }));
+            orientations.extend(sensor::orientation::world_from_joints(&joints, &stance.pose, &turn));
+        }
+        let confidence = vec![1.0; positions.len()];
+        SkeletonRecording { joints, time_ns, positions, confidence, orientations }
+    }
 }
 
 /// The true series of every channel, degrees; NaN where a decomposition is singular.
