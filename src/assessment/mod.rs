@@ -1,14 +1,24 @@
 //! What one pipeline found in one recording: series, summary, quality, provenance. Values only, no behaviour of HTTP
 //! or of a database.
 
+pub mod fusion_quality;
+pub mod fusion_settings;
+pub mod gait;
 pub mod joint_angles;
+pub mod leg_pose;
+pub mod leg_pose_settings;
 pub mod noise_model;
 pub mod provenance;
 pub mod quality;
 pub mod series;
 pub mod settings;
 
+pub use fusion_quality::{ClockQuality, FusionQuality, UnitQuality};
+pub use fusion_settings::{Clocks, FusionMethod, Mounting, SkeletonFusionSettings};
+pub use gait::Gait;
 pub use joint_angles::AngleChannel;
+pub use leg_pose::LegChannel;
+pub use leg_pose_settings::{LegCues, LegPoseMode, LegPoseSettings};
 pub use noise_model::{NoiseModel, NoiseModelName, NoiseModelReference};
 pub use provenance::Provenance;
 pub use quality::{Event, Quality, Warning};
@@ -26,6 +36,8 @@ pub struct Assessment {
     pub series: Vec<Series>,
     /// One line per series.
     pub summary: Vec<ChannelSummary>,
+    /// Steps, when the pipeline finds steps.
+    pub gait: Option<Gait>,
     /// How far the result can be trusted.
     pub quality: Quality,
     /// What is needed to compute the same bytes again.

@@ -1,5 +1,6 @@
 //! How far a result can be trusted.
 
+use super::fusion_quality::FusionQuality;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -21,6 +22,9 @@ pub struct Quality {
     pub effective_sample_size: Option<EffectiveSampleSize>,
     /// How segment lengths were found.
     pub calibration: Option<CalibrationQuality>,
+    /// How camera and inertial units were brought together, when they were.
+    #[serde(default)]
+    pub fusion: Option<FusionQuality>,
     /// What the reader should know; each has a stable code.
     pub warnings: Vec<Warning>,
     /// What went wrong when, by time; the longest thousand when there were more.

@@ -1,7 +1,10 @@
 //! What can be asked of a pipeline. Settings stand with the result because they are part of its provenance, and because
 //! whoever asks for an assessment need not know the pipeline.
 
+use super::fusion_settings::SkeletonFusionSettings;
+use super::leg_pose_settings::LegPoseSettings;
 use super::noise_model::{ADAPTIVE, InvalidNoiseModelName, NITE_TABLE1, NoiseModelName};
+use crate::recording::Segment;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -135,6 +138,10 @@ impl fmt::Display for Method {
 pub enum Settings {
     /// Joint angles from skeleton positions.
     JointAngles(JointAngleSettings),
+    /// Joint angles from skeleton positions and inertial units.
+    SkeletonFusion(SkeletonFusionSettings),
+    /// Leg pose and steps of a walker's user from depth images.
+    LegPose(LegPoseSettings),
     /// Training of a noise model from several recordings.
     NoiseModel(NoiseModelSettings),
 }
@@ -142,6 +149,17 @@ pub enum Settings {
 impl Default for Settings {
     fn default() -> Self {
         Settings::JointAngles(JointAngleSettings::default())
+    }
+}
+
+impl Settings {
+    /// What suits a recording that nobody said anything about: fusion where inertial units are worn on bones of the model,
+    /// joint angles otherwise.
+    pub fn suited_to(units: impl IntoIterator<Item = Segment>) -> Self {
+        if units.into_iter().any(|segment| segment.bone().is_some()) {
+            return Settings::SkeletonFusion(SkeletonFusionSettings::default());
+        }
+        Settings::default()
     }
 }
 
