@@ -129,6 +129,7 @@ pub fn assess_with(
     monitor.begin(Step::Summarizing, 0)?;
     let series = builder.finish();
     Ok(Assessment {
+        gait: None,
         pipeline: "joint_angles",
         time_ns: observations.time_ns,
         summary: series.iter().map(Series::summarize).collect(),
@@ -208,7 +209,8 @@ fn run_closed_geometry(
     Ok(())
 }
 
-fn observations_quality(observations: &Observations, calibration: &Calibration) -> Quality {
+/// Quality of the camera's frames.
+pub(super) fn observations_quality(observations: &Observations, calibration: &Calibration) -> Quality {
     let n = observations.len();
     let complete = (0..n).filter(|t| observations.seen(*t) == ALL_SEEN).count();
     let mut intervals: Vec<f64> = (1..n).map(|t| observations.interval_s(t)).collect();
@@ -221,6 +223,7 @@ fn observations_quality(observations: &Observations, calibration: &Calibration) 
         coverage: complete as f64 / n.max(1) as f64,
         effective_sample_size: None,
         calibration: Some(calibration.quality.clone()),
+        fusion: None,
         warnings: calibration.warnings.clone(),
         events: Vec::new(),
         event_counts: Vec::new(),

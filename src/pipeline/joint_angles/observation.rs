@@ -162,7 +162,16 @@ impl PointColumns {
             let is_seen = is_trusted(confidence[column], min_confidence);
             if is_seen { frame[column] } else { Vector3::repeat(f64::NAN) }
         };
-        let torso = self.torso.iter().map(|column| seen(*column)).sum::<Vector3<f64>>() / self.torso.len() as f64;
+        let torso = self.torso(frame, confidence, min_confidence);
         self.points.map(|column| seen(column) - torso)
+    }
+
+    /// The torso joint of a frame, in its axes, metres; NaN where the sensor's confidence in it is below `min_confidence`.
+    pub fn torso(&self, frame: &[Vector3<f64>], confidence: &[f32], min_confidence: f32) -> Vector3<f64> {
+        let seen = |column: usize| {
+            let is_seen = is_trusted(confidence[column], min_confidence);
+            if is_seen { frame[column] } else { Vector3::repeat(f64::NAN) }
+        };
+        self.torso.iter().map(|column| seen(*column)).sum::<Vector3<f64>>() / self.torso.len() as f64
     }
 }

@@ -25,11 +25,14 @@ pub struct Posterior {
 impl Posterior {
     /// What the series need of this posterior, a tenth of its size.
     pub fn summarize(&self) -> Summary {
-        let spread = self.covariance.as_ref().map(|covariance| Spread {
-            angles: angle_sd(&self.pose, covariance),
-            attitudes: std::array::from_fn(|i| covariance.fixed_view::<3, 3>(3 * i, 3 * i).into_owned()),
-        });
-        Summary { pose: self.pose.clone(), spread, seen: self.seen, limb_flags: self.limb_flags }
+        let spread = self.covariance.as_ref().map(|covariance| Spread::of(&self.pose, covariance));
+        Summary {
+            pose: self.pose.clone(),
+            spread,
+            seen: self.seen,
+            limb_flags: self.limb_flags,
+            twist_seen: [false; 4],
+        }
     }
 }
 
@@ -44,6 +47,8 @@ pub struct Summary {
     pub seen: SeenMask,
     /// Flags that concern every angle of a limb, by limb.
     pub limb_flags: [u8; 4],
+    /// True of a limb whose turn about itself is known from elsewhere than from joint centres, which do not show it.
+    pub twist_seen: [bool; 4],
 }
 
 /// Uncertainty of a posture.
@@ -53,6 +58,25 @@ pub struct Spread {
     pub angles: Angles,
     /// Covariance of the error vector of trunk, left and right shoulder, left and right hip, rad².
     pub attitudes: [Matrix3<f64>; 5],
+}
+
+impl Spread {
+    /// That of a posture whose error has a covariance.
+    pub fn of(pose: &Pose, covariance: &PoseCovariance) -> Self {
+        Self {
+            angles: angle_sd(pose, covariance),
+            attitudes: std::array::from_fn(|i| covariance.fixed_view::<3, 3>(3 * i, 3 * i).into_owned()),
+        }
+    }
+
+    /// Between this one and a later one, by a share of the time to it.
+    #[must_use]
+    pub fn towards(&self, later: &Spread, share: f64) -> Self {
+        Self {
+            angles: self.angles + (later.angles - self.angles) * share,
+            attitudes: std::array::from_fn(|i| self.attitudes[i] + (later.attitudes[i] - self.attitudes[i]) * share),
+        }
+    }
 }
 
 /// Standard deviation of each anatomical angle, radians.

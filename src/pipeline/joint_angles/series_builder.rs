@@ -71,7 +71,10 @@ impl AngleReader {
         if let Some(previous) = &self.previous_angles {
             unwrap_angles(&mut angles, previous);
         }
-        let unobservable = unobservable_angles(&frame.pose);
+        let mut unobservable = unobservable_angles(&frame.pose);
+        for limb in Limb::ALL.into_iter().filter(|limb| frame.twist_seen[limb.index()]) {
+            unobservable[limb_angles(limb).start + 2] = false;
+        }
         let theta = frame.pose.to_vector(&self.previous);
         let readings = std::array::from_fn(|channel| {
             let Some(component) = channel.checked_sub(ANGLE_COUNT) else {

@@ -254,6 +254,7 @@ fn observations_of(recording: &Recording) -> Result<Observations, PipelineError>
 /// Says in which of several recordings a defect lies.
 fn in_recording<T>(identity: &RecordingIdentity, result: Result<T, PipelineError>) -> Result<T, PipelineError> {
     result.map_err(|error| match error {
+        PipelineError::Defect(defect) => PipelineError::Defect(defect),
         PipelineError::Cancelled => PipelineError::Cancelled,
         PipelineError::Unsuitable { code, place, sentence } => {
             let place = place.map_or_else(|| identity.name.clone(), |place| format!("{}: {place}", identity.name));
