@@ -1,0 +1,119 @@
+//! Cue 2: depths of the model's projection against the image, pixel by pixel (\[walker\], section 4.4.2).
+//!
+//! ```text
+//! d2 = Σ |zP − zK| / (width · height)       zP, zK: depth of the model and of the foreground, 0 where there is none
+//! P2 = exp(−d2 / 3 mm)
+//! ```
+//!
+//! All pixels count, at full resolution, but only those under the model need to be visited:
+//!
+//! ```text
+//! Σ |zP − zK| = Σ over all zK + Σ over the model's pixels (|zP − zK| − zK)
+//! ```
+//!
+//! The solids are convex, so each covers one interval of rows in a column, and its front consists of few smooth
+//! [`faces`](face) on which depth along a column has a closed form. The ends of the intervals are found for many columns
+//! at once ([`outline`]), and so are polynomials for the depth of the sides ([`smooth_side`]); in each column they are sorted, and where solids overlap the nearer depth is taken. There is
+//! no depth buffer. The paper rasterises polygons that circumscribe the cylinders; here the surfaces are exact, and solids
+//! are closed by discs at their ends.
+
+pub mod column;
+pub mod face;
+pub mod outline;
+pub mod smooth_side;
+
+use super::foreground::Foreground;
+use crate::body::legs::solids::SOLID_COUNT;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::lanes::LANES;
+use crate::geometry::tapered_cylinder::TaperedCylinder;
+use column::{Column, ModelInImage};
+use face::Faces;
+use outline::{Outline, Outlines};
+use pulp::Simd;
+
+/// Scale of the likelihood, 1/m (λ2 = 1/3 per mm).
+pub const LAMBDA_PER_M: f64 = 1000.0 / 3.0;
+
+/// Solids must lie wholly beyond this depth, metres: nearer than any depth camera measures.
+const NEAREST: f64 = 0.1;
+
+/// Cue 2 of one frame.
+#[derive(Debug)]
+pub struct ProjectionCue<'a> {
+    foreground: &'a Foreground,
+    camera: &'a Intrinsics,
+}
+
+/// Memory for one model at a time.
+#[derive(Debug, Clone)]
+pub struct Scratch {
+    outlines: [Outlines; SOLID_COUNT],
+    column: Column,
+}
+
+impl Scratch {
+    /// Memory for images of a width.
+    pub fn new(width: usize) -> Self {
+        Self { outlines: std::array::from_fn(|_| Outlines::new(width)), column: Column::default() }
+    }
+}
+
+impl<'a> ProjectionCue<'a> {
+    /// The cue for a frame of a camera.
+    pub fn new(foreground: &'a Foreground, camera: &'a Intrinsics) -> Self {
+        Self { foreground, camera }
+    }
+
+    /// `d2` of a model's solids, metres. `None` when a part of them is behind the camera or too near to it.
+    #[inline(always)]
+    pub fn distance<S: Simd>(
+        &self,
+        simd: S,
+        solids: &[TaperedCylinder; SOLID_COUNT],
+        scratch: &mut Scratch,
+    ) -> Option<f64> {
+        if !solids.iter().all(is_in_front) {
+            return None;
+        }
+        let Foreground { width, height, .. } = *self.foreground;
+        let mut faces = [Faces::default(); SOLID_COUNT];
+        let (mut first, mut last) = (width, 0);
+        for k in 0..SOLID_COUNT {
+            let (solid, outlines) = (&solids[k], &mut scratch.outlines[k]);
+            faces[k] = Faces::new(solid);
+            Outline::new(solid, &faces[k], self.camera, width).trace(simd, &faces[k], self.camera, outlines);
+            first = first.min(outlines.columns.start);
+            last = last.max(outlines.columns.end);
+        }
+        let mut sums = [0.0f32; LANES];
+        let stride = self.foreground.stride();
+        let Scratch { outlines, column } = scratch;
+        let model = ModelInImage { faces: &faces, outlines, camera: self.camera };
+        for i in first..last {
+            column.clear(height);
+            for (solid, outlines) in outlines.iter().enumerate() {
+                if outlines.columns.contains(&i) {
+                    column.add_solid(solid, &outlines.at(i));
+                }
+            }
+            let depths = &self.foreground.columns[i * stride..(i + 1) * stride];
+            column.sum(simd, &model, i, depths, &mut sums);
+        }
+        let mut sum = self.foreground.depth_sum;
+        for lane in sums {
+            sum += f64::from(lane);
+        }
+        Some(sum / (width * height) as f64)
+    }
+}
+
+/// True when both discs of a solid lie beyond `NEAREST`, whichever way they face.
+pub fn is_in_front(solid: &TaperedCylinder) -> bool {
+    solid.start.z - solid.radii[0] > NEAREST && solid.end.z - solid.radii[1] > NEAREST
+}
+
+#[cfg(test)]
+pub(super) mod reference;
+#[cfg(test)]
+mod tests;
