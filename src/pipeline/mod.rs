@@ -1,11 +1,13 @@
 //! From a recording to an assessment: pure computation, no clock, no storage, no HTTP.
 
 pub mod joint_angles;
+pub mod leg_pose;
+pub mod skeleton_fusion;
 
 use crate::assessment::quality::CalibrationQuality;
 use crate::assessment::{Assessment, NoiseModel, Settings};
 use crate::progress::{Cancelled, Monitor};
-use crate::recording::Recording;
+use crate::recording::{DecodeError, Recording};
 use uuid::Uuid;
 
 /// Why a recording has no assessment.
@@ -14,6 +16,9 @@ pub enum PipelineError {
     /// Somebody asked to stop.
     #[error("the work was cancelled")]
     Cancelled,
+    /// The recording was read while it was assessed, and has a defect.
+    #[error(transparent)]
+    Defect(#[from] DecodeError),
     /// The recording cannot be assessed by this pipeline.
     #[error("{sentence}")]
     Unsuitable {
@@ -79,6 +84,11 @@ pub fn assess_with(
 ) -> Result<Assessment, PipelineError> {
     match settings {
         Settings::JointAngles(settings) => joint_angles::assess_with(recording, settings, inputs, monitor),
+        Settings::SkeletonFusion(settings) => skeleton_fusion::assess(recording, settings, monitor),
+        Settings::LegPose(_) => Err(PipelineError::unsuitable(
+            "no_depth_images",
+            "legs are tracked in depth images, and this recording was read without them",
+        )),
         Settings::NoiseModel(_) => Err(PipelineError::unsuitable(
             "not_an_assessment",
             "a noise model is trained from several recordings; one recording alone is assessed by joint_angles",

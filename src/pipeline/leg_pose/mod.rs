@@ -1,0 +1,380 @@
+//! A walker user's legs from depth images, and the steps that they make (\[walker\]).
+//!
+//! ```text
+//! depth image → foreground points on the floor's axes → pose of both legs → backward pass → contacts → steps
+//! ```
+//!
+//! The floor comes from the background image, or from the first frames; nothing is set by hand. The legs' shape is
+//! estimated from the first seconds in which legs are seen ([`tracker::calibrate`]); then each frame is tracked
+//! ([`tracker`]) and smoothed ([`smoother`]). Images are read one by one, so memory does not grow with the recording but
+//! by the poses.
+//!
+//! Deviations from the paper, with what they were worth on simulated walks, are in `docs/walker.md`.
+
+pub mod floor;
+pub mod floor_motion;
+pub mod foot_contact;
+pub mod foreground;
+pub mod leg_model;
+pub mod paper;
+mod report;
+pub mod smoother;
+pub mod steps;
+pub mod surface_fit;
+pub mod tracker;
+pub mod two_legs;
+
+use crate::assessment::{Assessment, LegPoseMode, LegPoseSettings};
+use crate::body::Side;
+use crate::geometry::camera::{DepthMap, Intrinsics};
+use crate::pipeline::PipelineError;
+use crate::progress::{Monitor, Step};
+use crate::recording::DecodeError;
+use crate::recording::depth::{DepthImage, DepthReader, DepthUnit};
+use floor::Floor;
+use foreground::{Foreground, Preparation, Region};
+use leg_model::{LegPoint, LegSegment, POINTS, ShapeVector, adult_shape, adult_shape_deviation, point_of};
+use nalgebra::Vector3;
+use smoother::{SmoothedFrame, Smoother};
+use std::io::Read;
+use surface_fit::SEGMENTS;
+use tracker::{Tracker, calibrate, visibility};
+use two_legs::TwoLegs;
+
+/// Frames with two legs that the shape is estimated from.
+const CALIBRATION_FRAMES: usize = 150;
+/// Every how many of them are used: neighbours say the same.
+const CALIBRATION_STRIDE: usize = 2;
+/// Frames that are waited for until there are so many; then those at hand must do.
+const CALIBRATION_PATIENCE: usize = 450;
+/// Frames in which a floor is looked for when there is no background.
+const FLOOR_PATIENCE: usize = 30;
+/// What differs from body to body between a fitted point and the joint: standard deviation of hip, knee, ankle and toe,
+/// metres; from simulated walks.
+const BODY_SD: [f64; 4] = [0.04, 0.010, 0.012, 0.020];
+/// A leg of which less than this share of shank and foot is seen is bridged.
+const SEEN_SHARE: f64 = 0.08;
+
+/// Depth images one by one, with what is known of their camera.
+pub trait DepthFrames {
+    /// Reads the next image over another one and answers its time in nanoseconds; nothing at the end.
+    ///
+    /// # Errors
+    /// The first defect of the recording.
+    fn next_into(&mut self, image: &mut DepthImage) -> Result<Option<i64>, DecodeError>;
+    /// The camera, when it was described.
+    fn intrinsics(&self) -> Option<Intrinsics>;
+    /// The scene without the person, when there is such an image.
+    fn background(&self) -> Option<&DepthImage>;
+}
+
+impl<R: Read> DepthFrames for DepthReader<R> {
+    fn next_into(&mut self, image: &mut DepthImage) -> Result<Option<i64>, DecodeError> {
+        DepthReader::next_into(self, image)
+    }
+
+    fn intrinsics(&self) -> Option<Intrinsics> {
+        self.calibration().map(|calibration| calibration.intrinsics())
+    }
+
+    fn background(&self) -> Option<&DepthImage> {
+        DepthReader::background(self)
+    }
+}
+
+/// Both legs in one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Legs {
+    /// Hip, knee, ankle and toe of the left leg, then of the right, in `floor`, metres.
+    pub points: [Vector3<f64>; POINTS],
+    /// Standard deviations along the axes of `floor`, metres.
+    pub deviations: [Vector3<f64>; POINTS],
+    /// Velocities of the points, m/s.
+    pub velocities: [Vector3<f64>; POINTS],
+    /// Share of each segment's visible side that was seen: thigh, shank, foot of the left leg, then of the right.
+    pub visibility: [f32; SEGMENTS],
+    /// Share of the foreground that is on neither leg, 0 to 1.
+    pub misfit: f64,
+    /// True of a leg that has been out of sight for too long.
+    pub lost: [bool; 2],
+}
+
+impl Legs {
+    /// A point of a leg in `floor`, metres.
+    pub fn point(&self, side: Side, point: LegPoint) -> &Vector3<f64> {
+        &self.points[point.index(side)]
+    }
+
+    /// True when enough of the leg's shank and foot was seen.
+    pub fn is_seen(&self, side: Side) -> bool {
+        let at = 3 * side as usize;
+        !self.lost[side as usize] && f64::from(self.visibility[at + 1].max(self.visibility[at + 2])) > SEEN_SHARE
+    }
+
+    fn exchange_sides(&mut self) {
+        let half = POINTS / 2;
+        for k in 0..half {
+            self.points.swap(k, half + k);
+            self.deviations.swap(k, half + k);
+            self.velocities.swap(k, half + k);
+        }
+        for k in 0..SEGMENTS / 2 {
+            self.visibility.swap(k, SEGMENTS / 2 + k);
+        }
+        self.lost.swap(0, 1);
+    }
+}
+
+/// One frame of a tracked recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedFrame {
+    /// Time, nanoseconds.
+    pub time_ns: i64,
+    /// The legs; none when there are none in the image.
+    pub legs: Option<Legs>,
+}
+
+/// A tracked recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// The floor.
+    pub floor: Floor,
+    /// The camera.
+    pub camera: Intrinsics,
+    /// The legs' shape; none when there were no legs.
+    pub shape: Option<ShapeVector>,
+    /// Every frame of the recording.
+    pub frames: Vec<TrackedFrame>,
+    /// Mean share of pixels without depth, 0 to 1.
+    pub missing: f64,
+    /// Mean share of seen pixels that are as in the background, 0 to 1; none without a background.
+    pub unchanged: Option<f64>,
+}
+
+/// Tracks a recording and finds its steps. The recording's digest is added to the provenance by the caller.
+///
+/// # Errors
+/// [`PipelineError::Unsuitable`] says what the recording lacks; [`PipelineError::Defect`] where it is damaged;
+/// [`PipelineError::Cancelled`] when the monitor was asked to stop.
+pub fn assess(
+    frames: impl DepthFrames,
+    settings: &LegPoseSettings,
+    monitor: &Monitor,
+) -> Result<Assessment, PipelineError> {
+    if settings.mode == LegPoseMode::Paper {
+        return Err(PipelineError::unsuitable("mode_not_available", "only the mode `fitted` is available"));
+    }
+    let track = track(frames, settings, &mut |_, _| {}, monitor)?;
+    monitor.begin(Step::Summarizing, 0)?;
+    report::assessment(&track, settings)
+}
+
+/// Tracks a recording; `watch` sees each prepared frame.
+///
+/// # Errors
+/// As [`assess`].
+pub fn track(
+    mut frames: impl DepthFrames,
+    settings: &LegPoseSettings,
+    watch: &mut dyn FnMut(i64, &Foreground),
+    monitor: &Monitor,
+) -> Result<Track, PipelineError> {
+    let Some(camera) = frames.intrinsics() else {
+        return Err(PipelineError::unsuitable(
+            "no_calibration",
+            "without the camera's intrinsics nothing can be measured; send `/depth/calibration`",
+        ));
+    };
+    monitor.begin(Step::Calibrating, 0)?;
+    let mut run = Run::start(&mut frames, camera, settings)?;
+    while let Some((time_ns, foreground)) = run.next(&mut frames)? {
+        watch(time_ns, &foreground);
+        run.take(time_ns, foreground);
+        monitor.advance(1)?;
+    }
+    Ok(run.finish())
+}
+
+/// A recording half-way through.
+struct Run {
+    preparation: Preparation,
+    image: DepthImage,
+    map: DepthMap,
+    /// Frames that wait for the shape.
+    waiting: Vec<(i64, Foreground)>,
+    waiting_with_legs: usize,
+    /// Images that were read before the floor was known.
+    early: std::collections::VecDeque<(i64, DepthMap)>,
+    tracker: Option<(Tracker, ShapeVector)>,
+    smoother: Smoother,
+    times: Vec<i64>,
+    smoothed: Vec<(i64, Legs)>,
+    has_background: bool,
+    sums: [f64; 2],
+}
+
+impl Run {
+    fn start(
+        frames: &mut impl DepthFrames,
+        camera: Intrinsics,
+        settings: &LegPoseSettings,
+    ) -> Result<Self, PipelineError> {
+        let mut image = DepthImage::missing(0, 0, DepthUnit::Raw11);
+        let background = frames.background().map(DepthImage::to_depth_map);
+        let mut floor = background.as_ref().and_then(|map| Floor::find(map, &camera));
+        let mut early = std::collections::VecDeque::new();
+        while floor.is_none() && early.len() < FLOOR_PATIENCE {
+            let Some(time_ns) = frames.next_into(&mut image)? else { break };
+            let map = image.to_depth_map();
+            floor = Floor::find(&map, &camera);
+            early.push_back((time_ns, map));
+        }
+        let Some(floor) = floor else {
+            return Err(PipelineError::unsuitable(
+                "no_floor",
+                "no floor was found in the background or in the first images; the camera must see the floor before the \
+                 user's feet, and its intrinsics must be its own",
+            ));
+        };
+        let region = Region { depth: settings.depth_m, x: settings.x_m };
+        Ok(Self {
+            has_background: background.is_some(),
+            preparation: Preparation::new(camera, floor, region, background.as_ref()),
+            image,
+            map: DepthMap::empty(0, 0),
+            waiting: Vec::new(),
+            waiting_with_legs: 0,
+            early,
+            tracker: None,
+            smoother: Smoother::default(),
+            times: Vec::new(),
+            smoothed: Vec::new(),
+            sums: [0.0; 2],
+        })
+    }
+
+    /// The next frame, prepared.
+    fn next(&mut self, frames: &mut impl DepthFrames) -> Result<Option<(i64, Foreground)>, PipelineError> {
+        if let Some((time_ns, map)) = self.early.pop_front() {
+            return Ok(Some((time_ns, self.preparation.prepare(&map))));
+        }
+        let Some(time_ns) = frames.next_into(&mut self.image)? else { return Ok(None) };
+        self.image.write_depth(&mut self.map);
+        Ok(Some((time_ns, self.preparation.prepare(&self.map))))
+    }
+
+    /// Tracks a frame, or lets it wait until the shape is known.
+    fn take(&mut self, time_ns: i64, foreground: Foreground) {
+        self.times.push(time_ns);
+        self.sums[0] += foreground.missing;
+        self.sums[1] += foreground.unchanged;
+        if self.tracker.is_some() {
+            self.track(time_ns, &foreground);
+            return;
+        }
+        self.waiting_with_legs += usize::from(TwoLegs::find(&foreground.points).is_some());
+        self.waiting.push((time_ns, foreground));
+        let is_enough = self.waiting_with_legs >= CALIBRATION_FRAMES;
+        if is_enough || (self.waiting.len() >= CALIBRATION_PATIENCE && self.waiting_with_legs > 0) {
+            self.begin_tracking();
+        } else if self.waiting.len() >= CALIBRATION_PATIENCE {
+            // Nobody is there yet.
+            self.waiting.clear();
+        }
+    }
+
+    /// Finds the shape and catches up with the frames that waited for it.
+    fn begin_tracking(&mut self) {
+        let height = self.preparation.floor().camera_height;
+        let used = self.waiting.iter().step_by(CALIBRATION_STRIDE);
+        let used = used.map(|(time_ns, foreground)| (*time_ns, foreground.points.as_slice()));
+        let shape = calibrate(height, used, (&adult_shape(), &adult_shape_deviation()));
+        self.tracker = Some((Tracker::new(height, shape), shape));
+        for (time_ns, foreground) in std::mem::take(&mut self.waiting) {
+            self.track(time_ns, &foreground);
+        }
+    }
+
+    fn track(&mut self, time_ns: i64, foreground: &Foreground) {
+        let Some((tracker, _)) = &mut self.tracker else { return };
+        let mut ready = Vec::new();
+        match tracker.advance(time_ns, &foreground.points) {
+            Some(fit) => self.smoother.push(fit, &mut ready),
+            None => self.smoother.finish(&mut ready),
+        }
+        self.keep(ready);
+    }
+
+    fn keep(&mut self, ready: Vec<SmoothedFrame>) {
+        let Some((_, shape)) = &self.tracker else { return };
+        let camera_height = self.preparation.floor().camera_height;
+        let focal = self.preparation.camera().fx;
+        self.smoothed.extend(ready.into_iter().map(|frame| {
+            let legs = legs_of(&frame, shape, focal, camera_height);
+            (frame.fit.time_ns, legs)
+        }));
+    }
+
+    fn finish(mut self) -> Track {
+        if self.tracker.is_none() && self.waiting_with_legs > 0 {
+            self.begin_tracking();
+        }
+        let mut ready = Vec::new();
+        self.smoother.finish(&mut ready);
+        self.keep(ready);
+        let mut tracked = self.smoothed.into_iter().peekable();
+        let mut frames: Vec<TrackedFrame> = self
+            .times
+            .iter()
+            .map(|&time_ns| TrackedFrame {
+                time_ns,
+                legs: tracked.next_if(|(time, _)| *time == time_ns).map(|(_, legs)| legs),
+            })
+            .collect();
+        put_sides_right(&mut frames);
+        let count = frames.len().max(1) as f64;
+        Track {
+            floor: self.preparation.floor().clone(),
+            camera: *self.preparation.camera(),
+            shape: self.tracker.map(|(_, shape)| shape),
+            frames,
+            missing: self.sums[0] / count,
+            unchanged: self.has_background.then_some(self.sums[1] / count),
+        }
+    }
+}
+
+fn seconds(time_ns: i64) -> f64 {
+    time_ns as f64 * 1e-9
+}
+
+fn legs_of(frame: &SmoothedFrame, shape: &ShapeVector, focal: f64, camera_height: f64) -> Legs {
+    let place = |k: usize| (Side::BOTH[k / 4], LegPoint::ALL[k % 4]);
+    Legs {
+        points: std::array::from_fn(|k| point_of(&frame.pose, place(k).0, place(k).1)),
+        deviations: std::array::from_fn(|k| {
+            point_of(&frame.deviation, place(k).0, place(k).1).map(|sd| sd.hypot(BODY_SD[k % 4]))
+        }),
+        velocities: std::array::from_fn(|k| point_of(&frame.velocity, place(k).0, place(k).1)),
+        visibility: std::array::from_fn(|s| {
+            visibility(&frame.fit, shape, Side::BOTH[s / 3], LegSegment::ALL[s % 3], focal, camera_height) as f32
+        }),
+        misfit: frame.fit.misfit,
+        lost: frame.fit.lost,
+    }
+}
+
+/// Exchanges left and right where a stretch began with the legs crossed: over a stretch the left leg is on the right in the
+/// image.
+fn put_sides_right(frames: &mut [TrackedFrame]) {
+    for stretch in frames.chunk_by_mut(|a, b| a.legs.is_some() == b.legs.is_some()) {
+        let apart: f64 = stretch
+            .iter()
+            .filter_map(|frame| frame.legs.as_ref())
+            .map(|legs| legs.point(Side::Left, LegPoint::Knee).x - legs.point(Side::Right, LegPoint::Knee).x)
+            .sum();
+        if apart < 0.0 {
+            stretch.iter_mut().filter_map(|frame| frame.legs.as_mut()).for_each(Legs::exchange_sides);
+        }
+    }
+}
