@@ -4,6 +4,8 @@ pub mod agreement;
 pub mod contender;
 pub mod error_analysis;
 pub mod figures;
+pub mod fusion;
+pub mod hinge;
 pub mod joint_angles;
 pub mod orientation;
 pub mod overview;
@@ -14,6 +16,7 @@ pub mod signed_rank;
 pub mod three_point;
 pub mod trial;
 pub mod verdict;
+pub mod walker;
 
 pub use contender::Contender;
 pub use joint_angles::{MEASURE_NAMES, Outcomes};

@@ -4,17 +4,21 @@ use crate::body::{Limb, Side};
 use crate::geometry::three_point::flexion_of_three_points;
 use crate::recording::SkeletonRecording;
 
-/// Knee flexion of each frame, degrees: 180° less the angle at the knee between hip and ankle; NaN where one of the
-/// three is missing. None for a recording that has no such joints.
+/// Knee flexion of each frame, degrees; see [`hinge_flexion_deg`].
 pub fn knee_flexion_deg(skeleton: &SkeletonRecording, side: Side) -> Option<Vec<f64>> {
-    let limb = if side == Side::Left { Limb::LeftLeg } else { Limb::RightLeg };
+    hinge_flexion_deg(skeleton, if side == Side::Left { Limb::LeftLeg } else { Limb::RightLeg })
+}
+
+/// Flexion of a limb's knee or elbow in each frame, degrees: 180° less the angle at it between the limb's root and end;
+/// NaN where one of the three is missing. None for a recording that has no such joints.
+pub fn hinge_flexion_deg(skeleton: &SkeletonRecording, limb: Limb) -> Option<Vec<f64>> {
     let mut columns = [0; 3];
     for (column, (joint, stand_in)) in columns.iter_mut().zip(limb.joints()) {
         *column = skeleton.column(joint).or_else(|| skeleton.column(stand_in))?;
     }
     let flexion = |t: usize| {
-        let [hip, knee, ankle] = columns.map(|column| skeleton.frame(t)[column]);
-        flexion_of_three_points(&hip, &knee, &ankle).to_degrees()
+        let [root, hinge, end] = columns.map(|column| skeleton.frame(t)[column]);
+        flexion_of_three_points(&root, &hinge, &end).to_degrees()
     };
     Some((0..skeleton.len()).map(flexion).collect())
 }
@@ -43,6 +47,14 @@ mod tests {
         let straight = leg(joints, [[0.0, 1.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.1, 0.0]]);
         assert!(knee_flexion_deg(&straight, Side::Right).unwrap()[0].abs() < 1e-5);
         assert_eq!(knee_flexion_deg(&straight, Side::Left), None);
+    }
+
+    #[test]
+    fn an_elbow_bends_as_a_knee_does() {
+        let joints = [Joint::LeftShoulder, Joint::LeftElbow, Joint::LeftWrist];
+        let bent = leg(joints, [[0.0, 1.0, 0.0], [0.0, 0.7, 0.0], [0.3, 0.7, 0.0]]);
+        assert!((hinge_flexion_deg(&bent, Limb::LeftArm).unwrap()[0] - 90.0).abs() < 1e-9);
+        assert_eq!(hinge_flexion_deg(&bent, Limb::RightArm), None);
     }
 
     #[test]

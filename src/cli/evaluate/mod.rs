@@ -1,11 +1,14 @@
 //! `surefoot evaluate`: methods beside a reference.
 
 mod document;
+mod fusion;
+mod hinge;
 mod noise;
 mod orientation;
 mod sources;
 mod table;
 mod verdict_table;
+mod walker;
 mod watch;
 
 use super::noise_model::NoiseModelChoice;
@@ -34,8 +37,14 @@ pub struct Args {
 enum What {
     /// Joint angles against gold-standard angles, real or simulated
     JointAngles(JointAngleArgs),
+    /// Camera skeleton and inertial units fused, simulated and real
+    Fusion(fusion::FusionArgs),
+    /// Flexion of hinge joints from two inertial units against optical angles
+    Hinge(hinge::HingeArgs),
     /// Orientation filters of inertial units against optical orientation
     Orientation(orientation::OrientationArgs),
+    /// Legs of a walker's user from depth images against the truth of simulated walks
+    Walker(walker::WalkerArgs),
 }
 
 /// Compare methods with the reference angles of every importable trial below a directory, or of simulated exercises.
@@ -107,7 +116,10 @@ struct JointAngleArgs {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.what {
         What::JointAngles(args) => joint_angles(args, &mut std::io::stdout().lock()),
+        What::Fusion(args) => fusion::run(args, &mut std::io::stdout().lock()),
+        What::Hinge(args) => hinge::run(args, &mut std::io::stdout().lock()),
         What::Orientation(args) => orientation::run(args, &mut std::io::stdout().lock()),
+        What::Walker(args) => walker::run(args, &mut std::io::stdout().lock()),
     }
 }
 
@@ -162,7 +174,7 @@ fn plan(args: &JointAngleArgs) -> anyhow::Result<Plan> {
     }
     let noise = match (&args.noise, args.table2) {
         (Some(noise), _) => noise.0.clone(),
-        (None, true) => Preset::ALL.to_vec(),
+        (None, true) => Preset::OF_JOINT_ANGLES.to_vec(),
         (None, false) => vec![Preset::Table1],
     };
     let particles = match (&args.particles[..], args.table2) {

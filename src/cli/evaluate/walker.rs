@@ -1,0 +1,120 @@
+//! `surefoot evaluate walker`: tracked legs beside the truth of simulated walks.
+
+use crate::assessment::LegPoseSettings;
+use crate::evaluation::walker::{MethodErrors, evaluate};
+use crate::synthetic::walker::cesium::body_from_glb;
+use crate::synthetic::walker::{Course, WalkerSettings, WalkerSimulation};
+use anyhow::Context;
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Compare tracked legs with the truth of simulated walks, in the shape of the paper's Tables 2 and 3.
+///
+/// Each sequence is a person, clothes, gait, camera mount and sensor noise of its own, drawn from the seed. Errors are
+/// absolute errors of the distance of the ankles in floor axes, over the frames with both feet on the floor. `baseline`
+/// has no model and no filter: the foreground is split into two legs, and the lowest part of each is the foot.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  surefoot evaluate walker\n  surefoot evaluate walker --seeds 3 --missing 0.3 --json"
+)]
+pub(super) struct WalkerArgs {
+    /// The figure that walks [default: depth/assets/CesiumMan.glb below $SUREFOOT_DATA, else ../shared/data]
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+    /// Sequences
+    #[arg(long, default_value_t = 6, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// Share of the legs' pixels that are missing, 0 to 0.9
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
+    missing: f64,
+    /// Tilt of the camera downwards, degrees [default: the seed's, 0 to 15]
+    #[arg(long, value_name = "DEG")]
+    tilt: Option<f64>,
+    /// Length of each sequence, seconds
+    #[arg(long, default_value_t = 10.0, value_name = "S")]
+    seconds: f64,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &WalkerArgs, out: &mut dyn Write) -> anyhow::Result<()> {
+    let usual = || {
+        let data = std::env::var_os("SUREFOOT_DATA").map_or(PathBuf::from("../shared/data"), PathBuf::from);
+        data.join("depth/assets/CesiumMan.glb")
+    };
+    let path = args.figure.clone().unwrap_or_else(usual);
+    let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let body = body_from_glb(&bytes)?;
+    let mut sequences = Vec::new();
+    for seed in 1..=args.seeds {
+        let mut settings = WalkerSettings::of_seed(Course::Straight, seed);
+        if let Some(tilt) = args.tilt {
+            settings = settings.with_tilt(tilt.to_radians());
+        }
+        settings.duration_s = args.seconds;
+        settings.errors.missing_share = args.missing;
+        let simulation = WalkerSimulation::new(&settings, body.clone())?;
+        sequences.push((seed, evaluate(&simulation, &LegPoseSettings::default())));
+    }
+    if args.json {
+        let documents: Vec<serde_json::Value> = sequences
+            .iter()
+            .map(|(seed, outcome)| match outcome {
+                Ok(methods) => {
+                    let methods: Vec<serde_json::Value> = methods.iter().map(document).collect();
+                    serde_json::json!({ "seed": seed, "methods": methods })
+                }
+                Err(error) => serde_json::json!({ "seed": seed, "problem": error.to_string() }),
+            })
+            .collect();
+        writeln!(out, "{}", serde_json::to_string_pretty(&documents)?)?;
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "{:<6}{:<10}{:>11}{:>16}{:>16}{:>16}{:>10}{:>6}",
+        "walk", "method", "frames", "length, cm", "width, cm", "all frames, cm", "ankle, cm", "lost"
+    )?;
+    for (seed, outcome) in &sequences {
+        match outcome {
+            Ok(methods) => methods.iter().try_for_each(|errors| write_row(*seed, errors, out))?,
+            Err(error) => writeln!(out, "{seed:<6}{error}")?,
+        }
+    }
+    writeln!(
+        out,
+        "\nMean absolute error (standard deviation) with both feet on the floor; all frames: length / width."
+    )?;
+    Ok(())
+}
+
+fn write_row(seed: u64, errors: &MethodErrors, out: &mut dyn Write) -> std::io::Result<()> {
+    let cm = |metres: f64| 100.0 * metres;
+    let with_deviation = |[mean, sd]: [f64; 2]| format!("{:.2} ({:.2})", cm(mean), cm(sd));
+    writeln!(
+        out,
+        "{seed:<6}{:<10}{:>11}{:>16}{:>16}{:>16}{:>10}{:>6}",
+        errors.method,
+        format!("{}/{}", errors.n_frames[0], errors.n_frames[1]),
+        with_deviation(errors.length_m),
+        with_deviation(errors.width_m),
+        format!("{:.2} / {:.2}", cm(errors.all_frames_m[0]), cm(errors.all_frames_m[1])),
+        errors.ankle_m.map_or("-".to_owned(), |metres| format!("{:.2}", cm(metres))),
+        errors.n_lost
+    )
+}
+
+fn document(errors: &MethodErrors) -> serde_json::Value {
+    serde_json::json!({
+        "method": errors.method,
+        "n_frames": errors.n_frames[1],
+        "n_estimated": errors.n_frames[0],
+        "step_length_error_m": { "mean": errors.length_m[0], "sd": errors.length_m[1] },
+        "step_width_error_m": { "mean": errors.width_m[0], "sd": errors.width_m[1] },
+        "all_frames_m": { "step_length": errors.all_frames_m[0], "step_width": errors.all_frames_m[1] },
+        "ankle_error_m": errors.ankle_m,
+        "n_lost": errors.n_lost,
+    })
+}
