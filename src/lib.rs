@@ -9,7 +9,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`geometry`] | rotations |
+//! | [`geometry`] | rotations, camera, floor, solids |
 //! | [`estimation`] | filters that know no body |
 //! | [`signal`] | time series |
 //! | [`progress`] | steps done, and the request to stop |

@@ -6,7 +6,7 @@ use super::etag::tagged_json;
 use super::page::{DEFAULT_LIMIT, Page, PageLink, id_from_cursor};
 use super::request::{ApiPath, ApiQuery};
 use super::state::AppState;
-use crate::assessment::{ChannelSummary, Provenance, Quality};
+use crate::assessment::{ChannelSummary, Gait, Provenance, Quality};
 use crate::storage::{
     AssessmentFilter, AssessmentId, JobId, PageRequest, PatientId, RecordingId, SessionId, StoredAssessment,
 };
@@ -78,6 +78,8 @@ pub struct AssessmentResponse {
     pub channels: Vec<String>,
     /// One line per series.
     pub summary: Vec<ChannelSummary>,
+    /// Steps of a walk; null when the pipeline finds none by its nature.
+    pub gait: Option<Gait>,
     /// How far the result can be trusted.
     pub quality: Quality,
     /// What is needed to compute the same bytes again.
@@ -108,6 +110,7 @@ impl From<StoredAssessment> for AssessmentResponse {
             end_s: stored.end_time_ns.map(s_from_ns),
             channels: stored.channels,
             summary: stored.summary,
+            gait: stored.gait,
             quality: stored.quality,
             provenance: stored.provenance,
         }
@@ -150,7 +153,7 @@ pub struct AssessmentsQuery {
     pub patient_id: Option<PatientId>,
     /// Only by this pipeline.
     #[garde(custom(super::text::optional_word))]
-    #[param(pattern = "^[a-z0-9_]{1,64}$", example = "joint_angles")]
+    #[param(pattern = "^[a-z0-9_]{1,64}$", example = "skeleton_fusion")]
     pub pipeline: Option<String>,
     /// Only by this method.
     #[garde(custom(super::text::optional_word))]

@@ -7,7 +7,8 @@ use utoipa::openapi::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 
 const DESCRIPTION: &str = "\
-Recordings of human movement go in, joint angles with their credible intervals come out.
+Recordings of human movement go in, joint angles with their credible intervals come out: from a camera's skeleton, and \
+from inertial units on the body together with it, which also give places of joints.
 
 The way of one recording: make a patient known (`POST /v1/patients`), begin a session (`POST /v1/sessions`), upload \
 (`POST /v1/sessions/{id}/recordings`), follow the job that the answer names (`GET /v1/jobs/{id}`, or its events), read \

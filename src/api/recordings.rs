@@ -9,7 +9,7 @@ use super::page::{DEFAULT_LIMIT, Page, PageLink, id_from_cursor};
 use super::request::{ApiJson, ApiPath, ApiQuery};
 use super::sessions::SessionPath;
 use super::state::AppState;
-use crate::assessment::Settings;
+use crate::assessment::{LegPoseMode, LegPoseSettings, Settings, SkeletonFusionSettings};
 use crate::recording::decode::Inspection;
 use crate::storage::{
     BlobReader, ClientId, PageRequest, PatientId, RecordingFilter, RecordingId, SessionId, StoredRecording,
@@ -110,8 +110,10 @@ impl Validate for JobRequest {
     fn validate_into(&self, _: &(), parent: &mut dyn FnMut() -> garde::Path, report: &mut garde::Report) {
         let settings = match &self.0 {
             Settings::JointAngles(settings) => settings,
+            Settings::SkeletonFusion(settings) => return validate_fusion(settings, parent, report),
+            Settings::LegPose(settings) => return validate_leg_pose(settings, parent, report),
             Settings::NoiseModel(_) => {
-                let message = "must be joint_angles; noise models are trained by POST /v1/noise-models";
+                let message = "must be joint_angles, skeleton_fusion or leg_pose; noise models are trained by POST /v1/noise-models";
                 return report.append(parent().join("pipeline"), garde::Error::new(message));
             }
         };
@@ -130,6 +132,26 @@ impl Validate for JobRequest {
         if settings.seed > MAX_SEED {
             report.append(parent().join("seed"), garde::Error::new(format!("must be at most {MAX_SEED}")));
         }
+    }
+}
+
+fn validate_leg_pose(settings: &LegPoseSettings, parent: &mut dyn FnMut() -> garde::Path, report: &mut garde::Report) {
+    let mut refuse = |field: &str, message: &str| report.append(parent().join(field), garde::Error::new(message));
+    if settings.mode == LegPoseMode::Paper {
+        refuse("mode", "must be fitted: paper is not available");
+    }
+    if !(64..=65_536).contains(&settings.particles) {
+        refuse("particles", "must lie between 64 and 65536");
+    }
+    if settings.seed > MAX_SEED {
+        refuse("seed", &format!("must be at most {MAX_SEED}"));
+    }
+    let is_range = |[low, high]: [f64; 2], [least, most]: [f64; 2]| least <= low && low < high && high <= most;
+    if !is_range(settings.depth_m, [0.0, 5.0]) {
+        refuse("depth_m", "must be a nearer and a farther depth, 0 to 5 m");
+    }
+    if !is_range(settings.x_m, [-3.0, 3.0]) {
+        refuse("x_m", "must be a left and a right limit, -3 to 3 m");
     }
 }
 
@@ -207,6 +229,26 @@ async fn next_chunk(mut reader: BlobReader) -> std::io::Result<Option<(Bytes, Bl
         Ok((!chunk.is_empty()).then(|| (Bytes::from(chunk), reader)))
     });
     reading.await.map_err(std::io::Error::other)?
+}
+
+fn validate_fusion(
+    settings: &SkeletonFusionSettings,
+    parent: &mut dyn FnMut() -> garde::Path,
+    report: &mut garde::Report,
+) {
+    let mut refuse = |field: &str, message: &str| report.append(parent().join(field), garde::Error::new(message));
+    if settings.gain.is_some_and(|gain| !(0.0..=10.0).contains(&gain)) {
+        refuse("gain", "must lie between 0 and 10");
+    }
+    if settings.rate_hz.is_some_and(|rate| !(1.0..=1000.0).contains(&rate)) {
+        refuse("rate_hz", "must lie between 1 and 1000");
+    }
+    if !(0.0..=1.0).contains(&settings.min_confidence) {
+        refuse("min_confidence", "must lie between 0 and 1");
+    }
+    if let Some((field, reason)) = settings.unused() {
+        refuse(field, reason);
+    }
 }
 
 /// Assess a recording again

@@ -45,8 +45,8 @@ pub struct SessionRequest {
     #[schema(max_length = 2000, pattern = "^[^\\u0000-\\u001f\\u007f]*$")]
     pub notes: Option<String>,
     /// Noise model of the sensor: `adaptive`, a shipped one, or one that the organisation trained, as `name` or
-    /// `name@version`. The first assessment of each recording takes it; without a version, the newest at the time of the
-    /// upload. Null means the method's own choice.
+    /// `name@version`. The first assessment of each recording takes it, unless inertial units are fused in it; without a
+    /// version, the newest at the time of the upload. Null means the method's own choice.
     #[garde(skip)]
     #[schema(pattern = "^[a-z][a-z0-9-]{0,63}(@[1-9][0-9]{0,9})?$", example = "kinect-v2")]
     pub noise_model: Option<String>,

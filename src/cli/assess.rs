@@ -1,34 +1,51 @@
 //! `surefoot assess`: one recording, assessed on this machine without a service.
 
+use super::assess_legs;
+use super::method::AnyMethod;
 use super::noise_model::NoiseModelChoice;
-use crate::assessment::{Assessment, JointAngleSettings, Method, Pass, Settings};
+use crate::assessment::{
+    Assessment, JointAngleSettings, LegPoseSettings, Method, Pass, Settings, SkeletonFusionSettings,
+};
+use crate::estimation::orientation_filter::OrientationMethod;
 use crate::pipeline::{self, Inputs};
 use crate::progress::{Monitor, Step};
 use crate::recording::decode::{Limits, decode};
 use crate::recording::{Format, Recording};
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::io::{IsTerminal, Write};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Assess one recording on this machine, without a service
 ///
-/// Reads a recording (MCAP or JSON, see docs/recording-format.md) and prints one line per joint angle: range, mean and
-/// interval. The same file and settings always give the same numbers as an upload would.
+/// Reads a recording (MCAP or JSON, see docs/recording-format.md) and prints one line per series, joint angles and with
+/// inertial units also places of joints: range, mean and interval. The same file and settings always give the same numbers
+/// as an upload would.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot assess squat.mcap\n  surefoot assess squat.mcap --csv angles.csv\n  \
     surefoot assess squat.json --method particle --particles 2048 --json\n  \
-    surefoot assess squat.mcap --noise-model kinect-v2")]
+    surefoot assess squat.mcap --noise-model kinect-v2\n  surefoot assess kick-with-units.mcap --method hierarchy")]
 pub struct Args {
     /// Recording, .mcap or .json; the content decides
     recording: PathBuf,
-    /// iekf (the default), ukf (unscented), guided (particles that look before they leap), particle (the paper's particle
-    /// filter), ik (closed geometry), nite (middleware's rotations)
-    #[arg(long, default_value_t = Method::Iekf, value_name = "METHOD")]
-    method: Method,
+    /// Of skeletons: iekf, ukf (unscented), guided (particles that look before they leap), particle (the paper's particle
+    /// filter), ik (closed geometry), nite (middleware's rotations). With inertial units: fused, hierarchy (the paper's
+    /// fusion), camera (alone), inertial (units alone) [default: fused where units are worn, otherwise iekf]
+    #[arg(long, value_name = "METHOD")]
+    method: Option<AnyMethod>,
+    /// Orientation filter of inertial units: smoother, vqf, madgwick, gyroscope; the method's own choice when absent
+    #[arg(long, value_name = "FILTER")]
+    orientation: Option<OrientationMethod>,
+    /// Gain of the orientation filter madgwick, rad/s [default: 0.033]
+    #[arg(long, value_name = "BETA")]
+    gain: Option<f64>,
+    /// Samples per second of a fused result [default: the units' own]
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
     /// smooth (over the whole recording; the default of methods that can) or filter (from the frames up to each)
     #[arg(long, value_name = "PASS")]
     pass: Option<Pass>,
@@ -45,6 +62,9 @@ pub struct Args {
     /// Write all series as CSV: time_s, then value, low, high and flags of each channel
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Of depth images: write each frame's ankles, knees and hips (camera's axes, metres), step length and width as CSV
+    #[arg(long, value_name = "FILE")]
+    frames: Option<PathBuf>,
     /// Print summary, quality and provenance as JSON
     #[arg(long)]
     json: bool,
@@ -55,35 +75,93 @@ pub struct Args {
 /// # Errors
 /// When the file is not a recording, or has no assessment; the sentence says where and what to do.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    if args.method.is_none()
+        && let Some(assessment) = assess_legs::assess(&args.recording, &LegPoseSettings::default())?
+    {
+        return write(args, &assessment);
+    }
+    if args.frames.is_some() {
+        bail!("--frames is of depth images, and {} has none", args.recording.display());
+    }
     let bytes = fs::read(&args.recording).with_context(|| format!("cannot read {}", args.recording.display()))?;
     let recording = recording_of(&bytes).with_context(|| args.recording.display().to_string())?;
-    let settings = Settings::JointAngles(JointAngleSettings {
-        method: args.method,
-        pass: args.pass,
-        particles: args.particles,
-        seed: args.seed,
-        noise_model: args.noise_model.as_ref().map(NoiseModelChoice::name),
-        ..JointAngleSettings::default()
-    });
+    let settings = settings(args, &recording)?;
     let inputs =
         Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model), ..Inputs::default() };
     let mut assessment = assess_with_progress(&recording, &settings, &inputs)?;
     assessment.provenance.recording_sha256 = hex::encode(Sha256::digest(&bytes));
+    write(args, &assessment)
+}
+
+/// Writes and prints what was asked for.
+fn write(args: &Args, assessment: &Assessment) -> anyhow::Result<()> {
+    if let Some(path) = &args.frames {
+        assess_legs::write_frames(assessment, path).with_context(|| format!("cannot write {}", path.display()))?;
+    }
     if let Some(path) = &args.csv {
-        write_csv(&assessment, path).with_context(|| format!("cannot write {}", path.display()))?;
+        write_csv(assessment, path).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let mut out = std::io::stdout().lock();
     if args.json {
         let document = serde_json::json!({
             "summary": assessment.summary,
+            "gait": assessment.gait,
             "quality": assessment.quality,
             "provenance": assessment.provenance,
         });
         writeln!(out, "{}", serde_json::to_string_pretty(&document)?)?;
     } else {
-        print_summary(&assessment, &mut out)?;
+        print_summary(assessment, &mut out)?;
+        assess_legs::print_steps(assessment, &mut out)?;
     }
     Ok(())
+}
+
+/// The settings that the arguments ask for; what they leave open depends on the recording.
+fn settings(args: &Args, recording: &Recording) -> anyhow::Result<Settings> {
+    let units = recording.inertial.iter().flat_map(|inertial| &inertial.sensors).map(|sensor| sensor.segment);
+    let method = args.method.unwrap_or(match Settings::suited_to(units) {
+        Settings::SkeletonFusion(settings) => AnyMethod::Fusion(settings.method),
+        _ => AnyMethod::JointAngles(Method::Iekf),
+    });
+    let of_angles = args.pass.is_some() || args.particles.is_some() || args.noise_model.is_some();
+    let of_fusion = args.orientation.is_some() || args.gain.is_some() || args.rate.is_some();
+    match method {
+        AnyMethod::JointAngles(_) if of_fusion => {
+            bail!("--orientation, --gain and --rate are of fusion; add --method fused, or leave them out")
+        }
+        AnyMethod::Fusion(_) if of_angles => {
+            bail!("--pass, --particles and --noise-model are of skeletons alone; add --method iekf, or leave them out")
+        }
+        AnyMethod::JointAngles(method) => Ok(Settings::JointAngles(JointAngleSettings {
+            method,
+            pass: args.pass,
+            particles: args.particles,
+            seed: args.seed,
+            noise_model: args.noise_model.as_ref().map(NoiseModelChoice::name),
+            ..JointAngleSettings::default()
+        })),
+        AnyMethod::Fusion(method) => {
+            let settings = SkeletonFusionSettings {
+                method,
+                orientation: args.orientation,
+                gain: in_range("--gain", args.gain, 0.0..=10.0)?,
+                rate_hz: in_range("--rate", args.rate, 1.0..=1000.0)?,
+                ..SkeletonFusionSettings::default()
+            };
+            match settings.unused() {
+                Some((name, reason)) => bail!("{name} {reason}"),
+                None => Ok(Settings::SkeletonFusion(settings)),
+            }
+        }
+    }
+}
+
+fn in_range(name: &str, value: Option<f64>, range: RangeInclusive<f64>) -> anyhow::Result<Option<f64>> {
+    if let Some(outside) = value.filter(|value| !range.contains(value)) {
+        bail!("{name} is {outside}, but must lie between {} and {}", range.start(), range.end());
+    }
+    Ok(value)
 }
 
 /// The recording that a file holds, whatever its format.
@@ -144,8 +222,10 @@ fn print_summary(assessment: &Assessment, out: &mut dyn Write) -> anyhow::Result
         )?;
     }
     writeln!(out, "\n{:<34}{:>9}{:>9}{:>9}{:>9}{:>12}", "channel", "min", "max", "mean", "covered", "95 % width")?;
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
     for line in &assessment.summary {
+        // Degrees to the tenth, metres to the millimetre.
+        let decimals = if line.channel.ends_with("_m") { 3 } else { 1 };
+        let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.decimals$}"));
         writeln!(
             out,
             "{:<34}{:>9}{:>9}{:>9}{:>8.0}%{:>12}",

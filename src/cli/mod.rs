@@ -1,14 +1,18 @@
 //! The commands of the binary: one file per command.
 
 pub mod assess;
+mod assess_legs;
 pub mod demo;
 pub mod evaluate;
 pub mod import;
+pub mod import_depth;
 pub mod key;
+mod method;
 mod noise_model;
 pub mod openapi;
 pub mod serve;
 pub mod simulate;
+pub mod simulate_walker;
 pub mod train;
 
 use clap::{Parser, Subcommand};
@@ -23,17 +27,38 @@ struct Cli {
     command: Command,
 }
 
+#[expect(clippy::large_enum_variant, reason = "there is one command in a run")]
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
     Serve(serve::Args),
     Assess(assess::Args),
-    Import(import::Args),
-    Simulate(simulate::Args),
+    Import(Import),
+    Simulate(Simulate),
     Evaluate(evaluate::Args),
     Train(train::Args),
     Key(key::Args),
     Openapi(openapi::Args),
+}
+
+/// Of a data set, or of what has arguments of its own.
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, arg_required_else_help = true)]
+struct Import {
+    #[command(subcommand)]
+    kind: Option<import_depth::Kind>,
+    #[command(flatten)]
+    dataset: Option<import::Args>,
+}
+
+/// Of an exercise, or of what has arguments of its own.
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, arg_required_else_help = true)]
+struct Simulate {
+    #[command(subcommand)]
+    kind: Option<simulate_walker::Kind>,
+    #[command(flatten)]
+    exercise: simulate::Args,
 }
 
 /// Runs the command that the arguments name.
@@ -46,11 +71,45 @@ pub fn run() -> anyhow::Result<()> {
         Command::Demo(args) => runtime.block_on(demo::run(&args)),
         Command::Assess(args) => assess::run(&args),
         Command::Serve(args) => runtime.block_on(serve::run(&args)),
-        Command::Import(args) => import::run(&args),
-        Command::Simulate(args) => simulate::run(&args),
+        Command::Import(Import { kind: Some(import_depth::Kind::Depth(args)), .. }) => import_depth::run(&args),
+        Command::Import(Import { dataset: Some(args), .. }) => import::run(&args),
+        Command::Simulate(Simulate { kind: Some(simulate_walker::Kind::Walker(args)), .. }) => {
+            simulate_walker::run(&args)
+        }
+        Command::Simulate(Simulate { kind: None, exercise }) => simulate::run(&exercise),
+        // The parser has asked for arguments already.
+        Command::Import(_) => anyhow::bail!("nothing to do; --help lists what there is"),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Key(args) => runtime.block_on(key::run(&args)),
         Command::Openapi(args) => openapi::run(&args),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn command(words: &[&str]) -> Result<Command, clap::Error> {
+        Cli::try_parse_from([&["surefoot"], words].concat()).map(|cli| cli.command)
+    }
+
+    #[test]
+    fn the_arguments_of_all_commands_fit_together() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn what_has_arguments_of_its_own_stands_beside_exercises_and_data_sets() {
+        let walker = command(&["simulate", "walker", "--out", "w.mcap", "--missing", "0.3"]);
+        assert!(matches!(walker, Ok(Command::Simulate(Simulate { kind: Some(_), .. }))), "{walker:?}");
+        let exercise = command(&["simulate", "step", "--out", "s.mcap"]);
+        assert!(matches!(exercise, Ok(Command::Simulate(Simulate { kind: None, .. }))), "{exercise:?}");
+        let depth = command(&["import", "depth", "f.u16le", "--calibration", "c.json", "--out", "w.mcap"]);
+        assert!(matches!(depth, Ok(Command::Import(Import { kind: Some(_), dataset: None }))), "{depth:?}");
+        let dataset = command(&["import", "cmu", "data", "out"]);
+        assert!(matches!(dataset, Ok(Command::Import(Import { kind: None, dataset: Some(_) }))), "{dataset:?}");
+        assert!(command(&["simulate"]).is_err() && command(&["import", "cmu"]).is_err());
     }
 }

@@ -104,7 +104,7 @@ fn told(error: PipelineError) -> anyhow::Error {
     match &error {
         PipelineError::Unsuitable { code, place: Some(place), sentence } => anyhow!("{code} at {place}: {sentence}"),
         PipelineError::Unsuitable { code, place: None, sentence } => anyhow!("{code}: {sentence}"),
-        PipelineError::Cancelled => anyhow!("{error}"),
+        PipelineError::Cancelled | PipelineError::Defect(_) => anyhow!("{error}"),
     }
 }
 

@@ -7,7 +7,7 @@ use super::{
     Access, AssessmentId, JobId, Page, PageRequest, PatientId, RecordingId, SessionId, StorageError, Store, row,
 };
 use crate::assessment::quality::CalibrationQuality;
-use crate::assessment::{Assessment, ChannelSummary, Provenance, Quality};
+use crate::assessment::{Assessment, ChannelSummary, Gait, Provenance, Quality};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
@@ -33,6 +33,8 @@ pub struct StoredAssessment {
     pub channels: Vec<String>,
     /// One line per series.
     pub summary: Vec<ChannelSummary>,
+    /// Steps, when the pipeline finds steps.
+    pub gait: Option<Gait>,
     /// How far the result can be trusted.
     pub quality: Quality,
     /// What is needed to compute the same bytes again; the settings are in it.
@@ -73,6 +75,7 @@ fn assessment_from_row(row: &SqliteRow) -> Result<StoredAssessment, StorageError
         method: row.try_get("method")?,
         channels: row::json(row, "channels")?,
         summary: row::json(row, "summary")?,
+        gait: row::optional_json(row, "gait")?,
         quality: row::json(row, "quality")?,
         provenance: row::json(row, "provenance")?,
         n_samples: row::count(row, "n_samples")?,
@@ -89,6 +92,7 @@ pub(crate) struct EncodedAssessment {
     method: String,
     channels: String,
     summary: String,
+    gait: Option<String>,
     quality: String,
     provenance: String,
     n_samples: i64,
@@ -106,6 +110,7 @@ impl EncodedAssessment {
             method: assessment.provenance.method.clone(),
             channels: row::readable_json("the channel names", &channels)?,
             summary: row::readable_json("the summary", &assessment.summary)?,
+            gait: assessment.gait.as_ref().map(|gait| row::readable_json("the gait", gait)).transpose()?,
             quality: row::readable_json("the quality", &assessment.quality)?,
             provenance: row::readable_json("the provenance", &assessment.provenance)?,
             n_samples: assessment.time_ns.len() as i64,
@@ -127,8 +132,8 @@ pub(crate) async fn insert(
     let id = AssessmentId::new();
     sqlx::query(
         "INSERT INTO assessments (id, organisation_id, recording_id, job_id, pipeline, method, channels, summary, quality, provenance,
-                                  n_samples, start_time_ns, end_time_ns, created_at)
-         SELECT ?1, r.organisation_id, r.id, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13
+                                  n_samples, start_time_ns, end_time_ns, created_at, gait)
+         SELECT ?1, r.organisation_id, r.id, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
          FROM recordings r WHERE r.id = ?2",
     )
     .bind(id)
@@ -144,6 +149,7 @@ pub(crate) async fn insert(
     .bind(encoded.start_time_ns)
     .bind(encoded.end_time_ns)
     .bind(ms_from_time(now))
+    .bind(&encoded.gait)
     .execute(&mut *connection)
     .await?;
     series::insert(connection, id, &encoded.series).await?;

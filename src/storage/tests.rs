@@ -70,6 +70,7 @@ async fn new_recording(store: &Store, session_id: SessionId) -> NewRecording {
         joints: vec![crate::body::Joint::Head],
         has_orientations: false,
         inertial_units: vec![],
+        depth: None,
         reference_channels: vec![],
         ignored_channels: vec![],
     };

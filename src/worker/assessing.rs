@@ -2,13 +2,13 @@
 
 use crate::assessment::{Assessment, NoiseModel, NoiseModelSettings, Settings};
 use crate::pipeline::joint_angles::training::{RecordingIdentity, Trainer};
-use crate::pipeline::{self, Inputs, PipelineError};
+use crate::pipeline::{self, Inputs, PipelineError, leg_pose};
 use crate::progress::{Cancelled, Monitor, Step};
 use crate::queue::JobError;
-use crate::recording::decode::{Limits, decode};
+use crate::recording::decode::{DepthReader, Limits, decode};
 use crate::recording::{DecodeError, Recording};
 use crate::storage::{BlobReader, StorageError, StoredRecording};
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 
 /// Why an attempt has no assessment.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +51,7 @@ impl From<PipelineError> for AttemptError {
     fn from(error: PipelineError) -> Self {
         match error {
             PipelineError::Cancelled => Self::Cancelled,
+            PipelineError::Defect(error) => error.into(),
             PipelineError::Unsuitable { code, place, sentence } => {
                 Self::Refused(JobError { code: code.to_owned(), place, sentence })
             }
@@ -87,6 +88,11 @@ pub fn assess_recording(
     limits: &Limits,
     monitor: &Monitor,
 ) -> Result<Assessment, AttemptError> {
+    if let Settings::LegPose(settings) = settings {
+        // Depth images are read while they are assessed: in memory there is never more than a few of them.
+        let reader = DepthReader::open(BufReader::new(reader), limits)?;
+        return Ok(leg_pose::assess(reader, settings, monitor)?);
+    }
     let decoded = decode_stored(reader, recording, limits, monitor)?;
     Ok(pipeline::assess_with(&decoded, settings, inputs, monitor)?)
 }

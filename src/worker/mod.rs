@@ -156,6 +156,10 @@ impl Worker {
                 let assessment = self.assessment(job, inputs, monitor).await?;
                 Ok(Outcome::Assessment(Box::new(assessment)))
             }
+            Settings::SkeletonFusion(_) | Settings::LegPose(_) => {
+                let assessment = self.assessment(job, Inputs::default(), monitor).await?;
+                Ok(Outcome::Assessment(Box::new(assessment)))
+            }
             Settings::NoiseModel(settings) => {
                 let model = self.noise_model(job, settings, monitor).await?;
                 Ok(Outcome::NoiseModel(Box::new(model)))

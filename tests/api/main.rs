@@ -6,8 +6,10 @@
 mod assessments;
 mod clients;
 mod events;
+mod fusion;
 mod health;
 mod jobs;
+mod leg_pose;
 mod noise_models;
 mod patient_calibration;
 mod patients;

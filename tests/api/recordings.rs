@@ -48,38 +48,6 @@ async fn both_formats_are_taken_and_recognised_by_their_first_bytes_when_unnamed
 }
 
 #[tokio::test]
-async fn inertial_units_alone_are_taken_and_described_and_their_joint_angles_refused_in_a_sentence() {
-    let app = TestApp::new().await;
-    let n = 0..101i64;
-    let document = json!({
-        "format": "surefoot", "version": 1,
-        "coordinates": {"handedness": "right", "up": "+y", "length_unit": "m"},
-        "inertial": [{
-            "segment": "left_thigh", "nominal_rate_hz": 50,
-            "time_ns": n.clone().map(|i| i * 10_000_000).collect::<Vec<_>>(),
-            "acceleration": n.clone().map(|i| json!([0.01 * (i % 3) as f64, 9.8, 0])).collect::<Vec<_>>(),
-            "angular_rate": n.map(|i| json!([0.001 * (i % 2) as f64, 0, 0])).collect::<Vec<_>>(),
-        }],
-    });
-    let path = format!("/v1/sessions/{}/recordings", app.session().await);
-    let upload = app.post(&path).body("application/json", document.to_string()).send().await;
-    let body = upload.expect(StatusCode::ACCEPTED);
-    let inspection = &body["recording"]["inspection"];
-    assert_eq!((&inspection["n_frames"], &inspection["duration_s"]), (&json!(0), &json!(1.0)));
-    let unit = &inspection["inertial_units"][0];
-    assert_eq!(
-        (&unit["segment"], &unit["n_samples"], &unit["rate_hz"]),
-        (&json!("left_thigh"), &json!(101), &json!(100.0))
-    );
-    assert_eq!(unit["warnings"][0]["kind"], "rate_differs", "{unit:#}");
-
-    app.run_pending_jobs().await;
-    let job = app.get(&format!("/v1/jobs/{}", text(&body["job"]["id"]))).send().await.expect(StatusCode::OK);
-    assert_eq!((&job["state"], &job["error"]["code"]), (&json!("failed"), &json!("no_skeleton")), "{job:#}");
-    assert!(text(&job["error"]["sentence"]).contains("no skeleton frames"), "{job:#}");
-}
-
-#[tokio::test]
 async fn the_content_comes_back_to_the_byte_and_is_not_sent_twice() {
     let app = TestApp::new().await;
     let session = app.session().await;

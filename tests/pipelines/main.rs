@@ -2,10 +2,12 @@
 
 mod body;
 mod events;
+mod fusion;
 mod live;
 mod model_methods;
 mod support;
 mod training;
+mod walker;
 
 use support::{centimetres, exercise, mean_absolute_error, mirrored, series, without};
 use surefoot::assessment::series::FLAG_BRIDGED;

@@ -115,6 +115,7 @@ fn inspection() -> Inspection {
         joints: Vec::new(),
         has_orientations: false,
         inertial_units: Vec::new(),
+        depth: None,
         reference_channels: Vec::new(),
         ignored_channels: Vec::new(),
     }
@@ -126,6 +127,7 @@ pub fn assessment(bytes: &[u8]) -> Assessment {
     let mut series = Series::empty("right_knee_flexion_deg", n);
     series.value = bytes.iter().map(|b| f32::from(*b)).collect();
     Assessment {
+        gait: None,
         pipeline: "joint_angles",
         time_ns: (0..n as i64).map(|i| i * 33_333_333).collect(),
         summary: vec![series.summarize()],

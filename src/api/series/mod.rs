@@ -58,9 +58,10 @@ pub enum Form {
 pub struct SeriesParameters {
     /// Names of channels, separated by commas; all when absent.
     #[garde(skip)]
-    #[param(pattern = "^[a-z0-9_]{1,64}(,[a-z0-9_]{1,64}){0,63}$", example = "right_knee_flexion_deg")]
+    #[param(pattern = "^[a-z0-9_]{1,64}(,[a-z0-9_]{1,64}){0,127}$", example = "right_knee_flexion_deg")]
     pub channels: Option<String>,
-    /// Every channel of one joint, for example `right_knee` or `trunk`.
+    /// Every channel of one joint, for example `right_knee` or `trunk`: its angles, and its place where the pipeline gives
+    /// one.
     #[garde(skip)]
     #[param(pattern = "^[a-z0-9_]{1,64}$", example = "right_knee")]
     pub joint: Option<String>,

@@ -14,7 +14,7 @@ use super::recordings::RecordingResponse;
 use super::request::ApiPath;
 use super::sessions::SessionPath;
 use super::state::AppState;
-use crate::assessment::{JointAngleSettings, Settings};
+use crate::assessment::{JointAngleSettings, LegPoseSettings, Settings};
 use crate::queue::{Job, Submission};
 use crate::storage::{NewRecording, SessionId, StoredRecording, StoredResponse};
 use announced::Announced;
@@ -50,7 +50,8 @@ pub struct UploadResponse {
 ///
 /// The body is the recording itself: MCAP with the profile `surefoot`, or a JSON recording; `application/octet-stream`
 /// is recognised by its first bytes. Everything in it is checked while it arrives, so a defect is told at once, with
-/// its place. The answer names the job that assesses it.
+/// its place. The answer names the job that assesses it: `skeleton_fusion` where the recording has inertial units on the
+/// body, `joint_angles` otherwise.
 ///
 /// A digest, when one is sent, is compared with what arrived. An `Idempotency-Key` makes it safe to send the same
 /// upload again: the first answer is repeated and nothing is stored twice. Without one, a second upload is a second
@@ -80,8 +81,18 @@ async fn upload_recording(
     announced.check_digest(arrived.sealed.sha256())?;
 
     let fingerprint = fingerprint(session.id, &arrived);
-    let settings = JointAngleSettings { noise_model: session.noise_model.clone(), ..JointAngleSettings::default() };
-    let settings = Settings::JointAngles(pinned(&state, &caller.access, settings).await?);
+    let units = arrived.inspection.inertial_units.iter().map(|unit| unit.segment);
+    let suited = match arrived.inspection.depth {
+        Some(_) => Settings::LegPose(LegPoseSettings::default()),
+        None => Settings::suited_to(units),
+    };
+    let settings = match suited {
+        Settings::JointAngles(settings) => {
+            let settings = JointAngleSettings { noise_model: session.noise_model.clone(), ..settings };
+            Settings::JointAngles(pinned(&state, &caller.access, settings).await?)
+        }
+        other => other,
+    };
     let blob = arrived.sealed.keep().await?;
     let new = NewRecording { session_id: session.id, blob, inspection: arrived.inspection };
     let Some(key) = &announced.idempotency_key else {

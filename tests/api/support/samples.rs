@@ -85,6 +85,7 @@ pub fn known_result() -> Arc<Assess> {
         }
         let series = vec![ramp, gaps];
         Ok(Assessment {
+            gait: None,
             pipeline: "joint_angles",
             time_ns: (0..KNOWN_SAMPLES as i64).map(|t| t * 10_000_000).collect(),
             summary: series.iter().map(Series::summarize).collect(),
@@ -107,6 +108,7 @@ pub fn known_result() -> Arc<Assess> {
 fn method_of(settings: &Settings) -> String {
     match settings {
         Settings::JointAngles(settings) => settings.method.name().to_owned(),
-        Settings::NoiseModel(_) => panic!("a training is no assessment"),
+        Settings::SkeletonFusion(settings) => settings.method.name().to_owned(),
+        Settings::LegPose(_) | Settings::NoiseModel(_) => panic!("not of the tests' samples"),
     }
 }

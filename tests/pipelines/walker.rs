@@ -1,0 +1,276 @@
+//! Legs and steps from depth images of a simulated walker's user, whose truth is known.
+
+use crate::support::series;
+use std::collections::BTreeSet;
+use std::io::Cursor;
+use std::sync::LazyLock;
+use surefoot::assessment::{Assessment, LegPoseSettings};
+use surefoot::body::Side;
+use surefoot::geometry::camera::Intrinsics;
+use surefoot::pipeline::PipelineError;
+use surefoot::pipeline::leg_pose::floor::Floor;
+use surefoot::pipeline::leg_pose::foreground::{Preparation, Region};
+use surefoot::pipeline::leg_pose::two_legs::TwoLegs;
+use surefoot::pipeline::leg_pose::{DepthFrames, assess};
+use surefoot::progress::Monitor;
+use surefoot::recording::depth::{DepthImage, DepthReader, MISSING_RAW};
+use surefoot::recording::{DecodeError, Limits};
+use surefoot::synthetic::walker::trousers::trousers;
+use surefoot::synthetic::walker::{Course, WalkerFrame, WalkerSettings, WalkerSimulation};
+
+fn simulation(course: Course, duration_s: f64) -> WalkerSimulation {
+    let settings = WalkerSettings::of_seed(course, 2).with_speed(0.6);
+    let settings = WalkerSettings { duration_s, rate_hz: 20.0, ..settings };
+    WalkerSimulation::new(&settings, trousers()).expect("settings in range")
+}
+
+fn recorded(simulation: &WalkerSimulation) -> Vec<u8> {
+    simulation.write(Cursor::new(Vec::new()), |_| {}).expect("a file in memory").into_inner()
+}
+
+static WALK: LazyLock<WalkerSimulation> = LazyLock::new(|| simulation(Course::Straight, 6.5));
+static WALK_BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| recorded(&WALK));
+
+fn read(bytes: &[u8]) -> DepthReader<&[u8]> {
+    DepthReader::open(bytes, &Limits::default()).expect("a whole recording")
+}
+
+/// The first images of the walk, changed.
+struct Changed<F> {
+    reader: DepthReader<&'static [u8]>,
+    background: Option<DepthImage>,
+    left: usize,
+    change: F,
+}
+
+impl<F: FnMut(&mut DepthImage)> Changed<F> {
+    fn new(n_frames: usize, change: F) -> Self {
+        let reader = read(&WALK_BYTES);
+        let background = DepthReader::background(&reader).cloned();
+        Self { reader, background, left: n_frames, change }
+    }
+}
+
+impl<F: FnMut(&mut DepthImage)> DepthFrames for Changed<F> {
+    fn next_into(&mut self, image: &mut DepthImage) -> Result<Option<i64>, DecodeError> {
+        if self.left == 0 {
+            return Ok(None);
+        }
+        self.left -= 1;
+        let time = DepthReader::next_into(&mut self.reader, image)?;
+        (self.change)(image);
+        Ok(time)
+    }
+
+    fn intrinsics(&self) -> Option<Intrinsics> {
+        Some(*WALK.intrinsics())
+    }
+
+    fn background(&self) -> Option<&DepthImage> {
+        self.background.as_ref()
+    }
+}
+
+fn assessed(frames: impl DepthFrames) -> Result<Assessment, PipelineError> {
+    assess(frames, &LegPoseSettings::default(), &Monitor::default())
+}
+
+fn codes(found: &Assessment) -> BTreeSet<&str> {
+    found.quality.warnings.iter().map(|warning| warning.code.as_str()).collect()
+}
+
+fn refusal(frames: impl DepthFrames) -> &'static str {
+    match assessed(frames) {
+        Err(PipelineError::Unsuitable { code, .. }) => code,
+        other => panic!("not refused: {:?}", other.map(|a| (a.gait, a.quality.warnings))),
+    }
+}
+
+/// When and with which foot contacts began, seconds.
+fn true_contacts(simulation: &WalkerSimulation) -> Vec<(Side, f64)> {
+    let truth: Vec<_> = (0..simulation.len()).map(|k| simulation.truth(k)).collect();
+    let mut contacts = Vec::new();
+    for pair in truth.windows(2) {
+        for side in Side::BOTH {
+            if !pair[0].contacts[side as usize] && pair[1].contacts[side as usize] {
+                contacts.push((side, pair[1].time_ns as f64 * 1e-9));
+            }
+        }
+    }
+    contacts
+}
+
+#[test]
+fn a_walk_gives_the_true_ankles_and_steps_and_no_step_that_did_not_happen() {
+    let found = assessed(read(&WALK_BYTES)).unwrap();
+    let mut errors = Vec::new();
+    for k in 0..WALK.len() {
+        let truth = WALK.truth(k);
+        for side in Side::BOTH {
+            let ankle = truth.legs[side as usize].ankle;
+            let estimate = ["x", "y", "z"].map(|axis| {
+                let name = format!("{}_ankle_{axis}_m", side.name());
+                f64::from(series(&found, &name).value[k])
+            });
+            errors.push((ankle - nalgebra::Point3::from(estimate)).norm());
+        }
+    }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!(mean < 0.025, "ankles: {mean} m");
+
+    let gait = found.gait.as_ref().unwrap();
+    let contacts = true_contacts(&WALK);
+    let strikes: Vec<(Side, f64)> = gait.steps.iter().map(|step| (step.side, step.heel_strike_s)).collect();
+    for (side, time) in &strikes {
+        let is_true = contacts.iter().any(|(foot, contact)| foot == side && (contact - time).abs() < 0.2);
+        assert!(is_true, "{side:?} at {time} s: {contacts:.2?}");
+    }
+    // The swing that the recording cuts off may be missing.
+    assert!(strikes.len() <= contacts.len() && strikes.len() + 1 >= contacts.len(), "{strikes:.2?}: {contacts:.2?}");
+    let used: Vec<_> = gait.steps.iter().filter(|step| step.excluded_because.is_empty()).collect();
+    assert!(used.len() as u64 == gait.n_steps_used && !used.is_empty());
+    for step in used {
+        let truth = WALK.steps();
+        let truth = truth.iter().find(|t| (t.contact_s - step.heel_strike_s).abs() < 0.2).unwrap();
+        let measure = step.measures.iter().find(|m| m.definition == "ankle_to_ankle_mid_double_support").unwrap();
+        assert!((measure.length_m - truth.ankle_length_m).abs() < 0.03, "{measure:?}: {truth:?}");
+    }
+    assert!(codes(&found).contains("in_evaluation"));
+    assert!(found.quality.coverage > 0.8, "{}", found.quality.coverage);
+}
+
+#[test]
+fn somebody_who_stands_takes_no_step_and_the_quality_says_so() {
+    let found = assessed(read(&recorded(&simulation(Course::Standing, 3.0)))).unwrap();
+    let gait = found.gait.as_ref().unwrap();
+    assert!(gait.steps.is_empty(), "{:?}", gait.steps);
+    assert!(codes(&found).contains("no_steps") && gait.cadence_per_min.is_none() && gait.summary.is_empty());
+    assert!((gait.standing_s - found.quality.duration_s).abs() < 1e-9);
+}
+
+#[test]
+fn the_same_images_give_the_same_bits_again_and_on_any_number_of_threads() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let found = pool.install(|| assessed(Changed::new(50, |_| {}))).unwrap();
+        let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let series = found.series.iter().map(|s| (bits(&s.value), bits(&s.low), bits(&s.high), s.flags.clone()));
+        (series.collect::<Vec<_>>(), serde_json::to_string(&(&found.gait, &found.quality)).unwrap())
+    };
+    let once = on(1);
+    assert!(once == on(1) && once == on(3));
+}
+
+#[test]
+fn images_without_legs_are_refused() {
+    let background = DepthReader::background(&read(&WALK_BYTES)).cloned().unwrap();
+    assert_eq!(refusal(Changed::new(25, |image| image.values.fill(MISSING_RAW))), "no_legs", "nothing is seen");
+    assert_eq!(refusal(Changed::new(25, |image| image.values.clone_from(&background.values))), "no_legs", "nobody");
+    assert_eq!(refusal(Changed::new(0, |_| {})), "no_legs", "no image");
+}
+
+#[test]
+fn a_thing_right_before_the_camera_takes_no_steps() {
+    // 0.4 m away, over the whole image.
+    let found = assessed(Changed::new(25, |image| image.values.fill(300)));
+    let Ok(found) = found else { return assert!(matches!(found, Err(PipelineError::Unsuitable { .. }))) };
+    assert!(found.gait.as_ref().unwrap().steps.is_empty(), "{:?}", found.gait);
+    assert!(codes(&found).is_superset(&BTreeSet::from(["background_mismatch", "no_steps"])), "{:?}", codes(&found));
+}
+
+#[test]
+fn random_values_give_no_steps() {
+    let mut state = 1_u64;
+    let noise = move |image: &mut DepthImage| {
+        for value in &mut image.values {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            *value = (state >> 53) as u16;
+        }
+    };
+    match assessed(Changed::new(40, noise)) {
+        Ok(found) => {
+            let gait = found.gait.as_ref().unwrap();
+            assert_eq!(gait.n_steps_used, 0, "{:?}", gait.steps);
+            assert!(gait.steps.is_empty(), "{:?} {:?}", gait.steps, codes(&found));
+            assert!(codes(&found).len() > 1, "{:?}", codes(&found));
+        }
+        Err(error) => assert!(matches!(error, PipelineError::Unsuitable { .. }), "{error}"),
+    }
+}
+
+#[test]
+fn a_camera_that_is_covered_during_the_walk_takes_no_steps_in_the_dark() {
+    let mut k = 0;
+    let hidden = 60..100;
+    let cover = |image: &mut DepthImage| {
+        if hidden.contains(&k) {
+            image.values.fill(MISSING_RAW);
+        }
+        k += 1;
+    };
+    let found = assessed(Changed::new(WALK.len(), cover)).unwrap();
+    let contacts = true_contacts(&WALK);
+    for step in &found.gait.as_ref().unwrap().steps {
+        assert!(!(3.2..4.9).contains(&step.heel_strike_s), "{step:?}");
+        let near = contacts.iter().any(|(side, t)| *side == step.side && (t - step.heel_strike_s).abs() < 0.25);
+        assert!(near || !step.excluded_because.is_empty(), "{step:?}: {contacts:.2?}");
+    }
+    assert!(codes(&found).contains("legs_often_unseen"), "{:?}", codes(&found));
+    assert!(found.quality.events.iter().any(|event| event.kind == "lost_leg"));
+}
+
+#[test]
+fn a_background_of_another_mounting_is_reported_and_steps_of_it_are_true_or_left_out() {
+    let other = WALK.settings().with_tilt(35.0_f64.to_radians());
+    let other = WalkerSimulation::new(&other, trousers()).unwrap().background();
+    let mut frames = Changed::new(80, |_| {});
+    frames.background = Some(other);
+    match assessed(frames) {
+        Ok(found) => {
+            assert!(codes(&found).contains("background_mismatch"), "{:?}", codes(&found));
+            assert_eq!(found.gait.as_ref().unwrap().n_steps_used, 0, "{:?}", found.gait);
+        }
+        Err(error) => assert!(matches!(error, PipelineError::Unsuitable { .. }), "{error}"),
+    }
+}
+
+#[test]
+fn images_whose_camera_is_not_described_are_refused() {
+    struct Unknown(Changed<fn(&mut DepthImage)>);
+    impl DepthFrames for Unknown {
+        fn next_into(&mut self, image: &mut DepthImage) -> Result<Option<i64>, DecodeError> {
+            self.0.next_into(image)
+        }
+        fn intrinsics(&self) -> Option<Intrinsics> {
+            None
+        }
+        fn background(&self) -> Option<&DepthImage> {
+            self.0.background()
+        }
+    }
+    assert_eq!(refusal(Unknown(Changed::new(3, |_| {}))), "no_calibration");
+}
+
+#[test]
+fn without_a_model_two_heaps_of_points_are_the_feet_and_one_leg_alone_is_no_pair() {
+    let camera = *WALK.intrinsics();
+    let background = WALK.background().to_depth_map();
+    let floor = Floor::find(&background, &camera).unwrap();
+    assert!((floor.camera_height - WALK.settings().mount.height_m).abs() < 0.01, "{}", floor.camera_height);
+    assert!((floor.tilt() - WALK.settings().mount.tilt).abs() < 0.01, "{}", floor.tilt());
+    let settings = LegPoseSettings::default();
+    let region = Region { depth: settings.depth_m, x: settings.x_m };
+    let preparation = Preparation::new(camera, floor.clone(), region, Some(&background));
+    let WalkerFrame { image, truth } = WALK.frame(30);
+    let points = preparation.prepare(&image.to_depth_map()).points;
+    let legs = TwoLegs::find(&points).unwrap();
+    for side in Side::BOTH {
+        let ankle = floor.point_from_sensor(&truth.legs[side as usize].ankle.coords);
+        let apart = legs.foot(side) - ankle;
+        // The middle of a foot is ahead of its ankle.
+        assert!(apart.x.abs() < 0.05 && apart.z.abs() < 0.15, "{side:?}: {apart:?}");
+    }
+    let left = legs.points[Side::Left as usize].clone();
+    assert_eq!(TwoLegs::find(&left[..20.min(left.len())]), None);
+    assert_eq!(TwoLegs::find(&[]), None);
+}
