@@ -37,16 +37,18 @@ pub struct ClockedUnits<'a> {
     pub plank: Option<CommonRest>,
 }
 
+/// Time for which a unit must have recorded for its disagreement with the camera to mean something, seconds: two of the
+/// windows that clocks are compared in. In a few seconds of a camera that misplaces joints nothing agrees with anything.
+const TELLING_S: f64 = 20.0;
+
 /// True of a unit that no clock makes agree with the camera; where the movement only does not show the clock, the
 /// declared one may still be right.
-fn is_unusable(refusal: &Refusal) -> bool {
+fn is_unusable(refusal: &Refusal, unit: &InertialSensor) -> bool {
     match refusal {
-        Refusal::TooLong
-        | Refusal::ClockRunsBackwards
-        | Refusal::NoOverlap
-        | Refusal::NoSharedMovement
-        | Refusal::Inconsistent
-        | Refusal::ImplausibleDrift { .. } => true,
+        Refusal::TooLong | Refusal::ClockRunsBackwards | Refusal::NoOverlap => true,
+        Refusal::NoSharedMovement | Refusal::Inconsistent | Refusal::ImplausibleDrift { .. } => {
+            unit.duration_s() >= TELLING_S
+        }
         Refusal::TooShort
         | Refusal::UnitStill
         | Refusal::CameraStill
@@ -87,7 +89,7 @@ pub fn clocked_units<'a>(
                 quality: quality(found, &alignment.clock, alignment.residual_s),
                 ..declared
             }),
-            Err(refusal) if is_unusable(refusal) => refusals.push(format!("{}: {refusal}", unit.segment)),
+            Err(refusal) if is_unusable(refusal, unit) => refusals.push(format!("{}: {refusal}", unit.segment)),
             Err(_) if !overlaps(skeleton, &declared) => {
                 refusals.push(format!("{}: {}", unit.segment, Refusal::NoOverlap));
             }

@@ -2,6 +2,7 @@ use super::{KICK, error, fused, unit, warnings, with_units};
 use crate::support::{lose_all, series};
 use surefoot::assessment::Assessment;
 use surefoot::assessment::series::FLAG_BRIDGED;
+use surefoot::recording::import::{Dataset, list};
 use surefoot::recording::{Recording, Segment};
 
 const KNEE: &str = "right_knee_flexion_deg";
@@ -74,4 +75,20 @@ fn what_neither_tells_is_bridged() {
     assert_eq!(other, 0.0);
     let line = found.summary.iter().find(|line| line.channel == KNEE).unwrap();
     assert!(line.coverage < 0.95, "{line:?}");
+}
+
+#[test]
+fn a_few_real_seconds_that_do_not_show_the_clock_are_fused_on_the_declared_one_and_say_so() {
+    let data = std::env::var_os("SUREFOOT_DATA").map_or("../shared/data".into(), std::path::PathBuf::from);
+    let Ok(sources) = list(Dataset::Utdmhad, &data) else {
+        println!("skipped: no recordings of utdmhad below {}", data.display());
+        return;
+    };
+    // One of each movement and person is enough to meet every refusal.
+    for source in sources.iter().step_by(5) {
+        let recording = source.read().expect("a trial").recording;
+        let found = fused(&recording);
+        let is_told = found.quality.warnings.iter().any(|warning| warning.code == "clock_not_identified");
+        assert!(is_told || unit(&found, Segment::RightThigh).clock.evidence != "declared", "{}", source.name);
+    }
 }
