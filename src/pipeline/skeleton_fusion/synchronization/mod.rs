@@ -38,7 +38,7 @@ pub use common_rest::{CommonRest, Support, UnitAtRest, common_rest};
 pub use refusal::Refusal;
 
 use crate::recording::{InertialSensor, Segment, SkeletonRecording};
-use jumps::{MIN_JUMPS, flights, trains};
+use jumps::{MIN_JUMPS, flights, trains, without_landings};
 use line::{Fit, Line, PRIOR_DRIFT_SD, fit};
 use motion::{CameraGrid, Motion, smoothing_s};
 use search::{Coarse, Found, search, search_jumps};
@@ -187,7 +187,7 @@ pub fn synchronize(skeleton: &SkeletonRecording, units: &[InertialSensor]) -> Sy
         alignments.push(match (&camera, side) {
             (Err(refusal), _) | (_, Err(refusal)) => Err(*refusal),
             (Ok(camera), Ok(side)) => match camera.motion(skeleton, unit.segment).map(Side::new) {
-                Some(seen) => align(&seen, &jumps, side, unit.clock_offset_ns),
+                Some(seen) => align(&seen, &jumps, side, &without_landings(&side.motion), unit.clock_offset_ns),
                 None => Err(Refusal::NotTracked),
             },
         });
@@ -205,8 +205,14 @@ pub fn synchronize(skeleton: &SkeletonRecording, units: &[InertialSensor]) -> Sy
 
 /// Aligns a unit with what the camera (or another unit, on the camera's clock) saw of its movement.
 ///
-/// `jumps` are the trains that the camera saw.
-fn align(camera: &Side, jumps: &[Vec<f64>], unit: &Side, declared_ns: i64) -> Result<Alignment, Refusal> {
+/// `jumps` are the trains that the camera saw, `felt` is what is compared of the unit's motion.
+fn align(
+    camera: &Side,
+    jumps: &[Vec<f64>],
+    unit: &Side,
+    felt: &Motion,
+    declared_ns: i64,
+) -> Result<Alignment, Refusal> {
     if unit.is_still() {
         return Err(Refusal::UnitStill);
     }
@@ -218,8 +224,8 @@ fn align(camera: &Side, jumps: &[Vec<f64>], unit: &Side, declared_ns: i64) -> Re
     let unit_s = unit_grid.len as f64 * unit_grid.step_s();
     let start = Line { reference_s: 0.5 * unit_s, offset_s: found.lag_s, drift: 0.0 };
     let slack_s = (SEARCH_SLACK_S + MAX_DRIFT * 0.5 * unit_s).min(MAX_SLACK_S);
-    let rough = fit(&observe(&camera.motion, &unit.motion, &start, slack_s)).ok_or(Refusal::NoSharedMovement)?;
-    let observations = observe(&camera.motion, &unit.motion, &rough.line, LINE_SLACK_S);
+    let rough = fit(&observe(&camera.motion, felt, &start, slack_s)).ok_or(Refusal::NoSharedMovement)?;
+    let observations = observe(&camera.motion, felt, &rough.line, LINE_SLACK_S);
     let Fit { line, offset_sd_s, drift_sd, residual_s, agrees } =
         fit(&observations).ok_or(Refusal::NoSharedMovement)?;
     let n_windows = agrees.iter().filter(|agrees| **agrees).count();
@@ -308,7 +314,7 @@ fn align_by_neighbours(
             }
         }
         let by_reference = references.iter().filter_map(|(segment, reference, seen)| {
-            let found = align(seen, jumps, side, units[i].clock_offset_ns).ok()?;
+            let found = align(seen, jumps, side, &side.motion, units[i].clock_offset_ns).ok()?;
             let neighbour_sd_s = if found.has_jumps { 0.0 } else { NEIGHBOUR_SD_S };
             let mut clock = found.clock;
             clock.offset_sd_s = clock.offset_sd_s.hypot(reference.clock.offset_sd_s).hypot(neighbour_sd_s);
