@@ -75,7 +75,8 @@ impl Series {
         let max = observed().fold(f64::NEG_INFINITY, f64::max);
         let mut widths: Vec<f32> =
             self.low.iter().zip(&self.high).map(|(l, h)| h - l).filter(|w| w.is_finite()).collect();
-        widths.sort_by(f32::total_cmp);
+        let middle = widths.len() / 2;
+        let median = (!widths.is_empty()).then(|| *widths.select_nth_unstable_by(middle, f32::total_cmp).1);
         ChannelSummary {
             channel: self.channel.clone(),
             coverage: count as f64 / self.value.len().max(1) as f64,
@@ -83,7 +84,7 @@ impl Series {
             max: when_any(max),
             range: when_any(max - min),
             mean: when_any(observed().sum::<f64>() / count.max(1) as f64),
-            interval_width: widths.get(widths.len() / 2).map(|w| f64::from(*w)),
+            interval_width: median.map(f64::from),
         }
     }
 }

@@ -20,6 +20,10 @@ const LEAST_SD: f64 = 0.002;
 const LIMB_SD: f64 = 0.06;
 /// Standard deviation of one frame's evidence for it, metres: the posture's offset of a camera.
 const LIMB_NOISE: f64 = 0.025;
+/// Weights of a limb's root, middle and end. Units turn bones away from where the camera has them, and lengths are constant:
+/// not all three points can stay where they were seen. The knee (or elbow) stays, which belongs to both bones; the root lies
+/// inside the body, where no camera sees it, and the end is the farthest.
+const POINT_WEIGHTS: [f64; 3] = [1.0, 5.0, 1.0];
 
 /// A place over time, smoothed over the camera's frames.
 #[derive(Debug, Clone, PartialEq)]
@@ -141,18 +145,19 @@ impl Places {
     }
 }
 
-/// How far the camera sees a limb from where the posture has it: the mean over its points, drawn towards zero by what is
-/// known of hips and shoulders. None where no point is seen.
+/// How far the camera sees a limb from where the posture has it: the weighted mean over its points, drawn towards zero by
+/// what is known of hips and shoulders. None where no point is seen.
 fn displacement(seen: &Points, own: &Points, limb: Limb) -> Seen {
-    let residuals = (0..3).map(|level| point_index(limb, level)).map(|p| seen[p] - own[p]);
-    let residuals: Vec<Vector3<f64>> = residuals.filter(|r| r.x.is_finite()).collect();
-    let n = residuals.len() as f64;
-    if residuals.is_empty() {
+    let residual = |level: usize| seen[point_index(limb, level)] - own[point_index(limb, level)];
+    let residuals = POINT_WEIGHTS.iter().enumerate().map(|(level, weight)| (residual(level), *weight));
+    let residuals = residuals.filter(|(residual, _)| residual.x.is_finite());
+    let (sum, weight) =
+        residuals.fold((Vector3::zeros(), 0.0), |(sum, total), (residual, w)| (sum + residual * w, total + w));
+    if weight == 0.0 {
         return None;
     }
-    let mean = residuals.iter().sum::<Vector3<f64>>() / n;
-    let share = LIMB_SD.powi(2) / (LIMB_SD.powi(2) + LIMB_NOISE.powi(2) / n);
-    Some((mean * share, LIMB_NOISE))
+    let share = LIMB_SD.powi(2) / (LIMB_SD.powi(2) + LIMB_NOISE.powi(2) / weight);
+    Some((sum / weight * share, LIMB_NOISE))
 }
 
 #[cfg(test)]

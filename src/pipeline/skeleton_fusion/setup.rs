@@ -64,22 +64,22 @@ impl Setup {
         mounting: Mounting,
     ) -> Option<Self> {
         let plank_headings = plank.as_ref().map(|plank| headings_on(plank, motions));
-        let solve = |from_ns: i64| {
+        let solve = |from_ns: i64, earlier: Option<&Alignment>| {
             let moments = moments(camera, motions, from_ns);
             let evidence = Evidence { skeleton, motions, moments: &moments, plank: plank_headings.as_ref(), mounting };
-            let alignment = align(&evidence, &AlignmentTuning::default());
+            let alignment = align(&evidence, &AlignmentTuning::default(), earlier);
             alignment.map(|alignment| (moments, alignment))
         };
         // Between the plank and the body the units move in ways that no bone does. A person who has put them on stands
         // still for a moment; where nobody does, the time is found by what the camera sees.
         let left_ns = plank.as_ref().map(|plank| plank.span_ns[1] + (LEAVING_S * 1e9) as i64);
         let mut worn_from_ns = left_ns.map_or(i64::MIN, |left| rest_of_all(motions, left).unwrap_or(left));
-        let (mut moments, mut alignment) = solve(worn_from_ns)?;
+        let (mut moments, mut alignment) = solve(worn_from_ns, None)?;
         if left_ns.is_some() && camera.is_some() {
             let agreed = first_agreement(&moments, &alignment).unwrap_or(worn_from_ns);
             if agreed > worn_from_ns {
                 worn_from_ns = agreed;
-                (moments, alignment) = solve(worn_from_ns)?;
+                (moments, alignment) = solve(worn_from_ns, Some(&alignment))?;
             }
         }
         Some(Self { plank, worn_from_ns, moments, alignment, plank_headings })

@@ -107,7 +107,7 @@ fn precision_of(bone: Bone, rotation: &Rotation3<f64>) -> Matrix3<f64> {
 }
 
 /// Time before and after a part in which a bone needs the camera, seconds: the filter finds its way within it.
-const LEAD_S: f64 = 3.0;
+const LEAD_S: f64 = 1.0;
 
 /// Posture and its covariance at the frames of the camera in which some bone needs it.
 #[derive(Debug, Clone, PartialEq)]

@@ -49,14 +49,17 @@ impl Fault {
     const ALL: [Fault; 5] =
         [Fault::Degrees, Fault::Mirrored(0), Fault::Mirrored(1), Fault::Mirrored(2), Fault::LeftHanded];
 
-    fn undone(self, mut rate: Vector3<f64>) -> Vector3<f64> {
+    /// What a turn as the gyroscope tells it is with the fault undone. `in_degrees` is the turn if the rates were in
+    /// degrees; all others turn by the same angle about another axis.
+    fn undone(self, turn: &UnitQuaternion<f64>, in_degrees: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         match self {
-            Fault::Degrees => rate.map(f64::to_radians),
+            Fault::Degrees => *in_degrees,
             Fault::Mirrored(axis) => {
-                rate[axis] = -rate[axis];
-                rate
+                let mut mirrored = turn.into_inner();
+                mirrored.coords[axis] = -mirrored.coords[axis];
+                UnitQuaternion::new_unchecked(mirrored)
             }
-            Fault::LeftHanded => -rate,
+            Fault::LeftHanded => turn.conjugate(),
         }
     }
 }
@@ -95,7 +98,7 @@ impl GravityAgreement {
         if interval_ns > MAX_INTERVAL_NS {
             (self.anchor, self.n) = (None, 0);
         }
-        self.carry(*angular_rate, interval_ns as f64 * 1e-9);
+        self.carry(time_ns, angular_rate, interval_ns as f64 * 1e-9);
         if self.n == 0 {
             (self.window_ns, self.sum, self.is_quiet) = (time_ns, Vector3::zeros(), true);
         }
@@ -111,12 +114,18 @@ impl GravityAgreement {
     }
 
     /// Turns what was seen at the anchor to now: a direction that rests in the world turns backwards in the unit.
-    fn carry(&mut self, rate: Vector3<f64>, dt: f64) {
-        let Some((_, _, carried)) = &mut self.anchor else { return };
+    fn carry(&mut self, time_ns: i64, rate: &Vector3<f64>, dt: f64) {
+        let Some((since_ns, _, carried)) = &mut self.anchor else { return };
+        if time_ns - *since_ns > *APART_NS.end() {
+            self.anchor = None;
+            return;
+        }
         let [as_it_is, undone @ ..] = carried;
-        *as_it_is = UnitQuaternion::from_scaled_axis(-rate * dt) * *as_it_is;
+        let turn = UnitQuaternion::from_scaled_axis(-rate * dt);
+        let in_degrees = UnitQuaternion::from_scaled_axis(-rate.map(f64::to_radians) * dt);
+        *as_it_is = turn * *as_it_is;
         for (up, fault) in undone.iter_mut().zip(Fault::ALL) {
-            *up = UnitQuaternion::from_scaled_axis(-fault.undone(rate) * dt) * *up;
+            *up = fault.undone(&turn, &in_degrees) * *up;
         }
     }
 
@@ -128,7 +137,7 @@ impl GravityAgreement {
             if apart < *APART_NS.start() {
                 return;
             }
-            if APART_NS.contains(&apart) && before.angle(&up) > TURNED {
+            if before.angle(&up) > TURNED {
                 for (evidence, undone) in self.evidence.iter_mut().zip(undone) {
                     if as_it_is.angle(undone) > TOLD_APART {
                         evidence.n += 1;

@@ -334,21 +334,23 @@ fn wrapped(angle: f64) -> f64 {
     angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
 }
 
-/// Moves the estimate by a step, shortened so that no rotation is larger than `limit`; returns the largest rotation.
+/// Moves the estimate by a step in which no rotation is larger than `limit`; returns the largest rotation of the step.
+///
+/// Each rotation is cut off by itself: the heading of a stretch in which nothing tells it would otherwise hold up all others.
 pub(super) fn apply(alignment: &mut Alignment, stretch: &mut [f64], step: &DVector<f64>, limit: f64) -> f64 {
     let unknowns = alignment.unknowns.clone();
-    let largest = step.rows(0, unknowns.offsets).amax();
-    let step = step * (limit / largest.max(limit));
-    alignment.tilt = Rotation3::new(Vector3::new(step[TILT], 0.0, step[TILT + 1])) * alignment.tilt;
+    let within = |angle: f64| angle.clamp(-limit, limit);
+    let turn_within = |turn: Vector3<f64>| turn.cap_magnitude(limit);
+    alignment.tilt = Rotation3::new(turn_within(Vector3::new(step[TILT], 0.0, step[TILT + 1]))) * alignment.tilt;
     if let (Some(index), Some(heading)) = (unknowns.plank, alignment.plank_heading.as_mut()) {
-        *heading = wrapped(*heading + step[index]);
+        *heading = wrapped(*heading + within(step[index]));
     }
     for (unit, found) in alignment.units.iter_mut().zip(&unknowns.units) {
         let turn = Vector3::from_fn(|axis, _| step[found.mounting + axis]);
-        unit.imu_from_bone *= Rotation3::new(turn);
+        unit.imu_from_bone *= Rotation3::new(turn_within(turn));
         for (course, first) in unit.headings.iter_mut().zip(&found.headings) {
             for (point, heading) in course.values.iter_mut().enumerate() {
-                *heading += step[first + point];
+                *heading += within(step[first + point]);
             }
             course.drift += step[first + course.values.len()];
         }
@@ -358,5 +360,5 @@ pub(super) fn apply(alignment: &mut Alignment, stretch: &mut [f64], step: &DVect
         *offset += Vector3::from_fn(|axis, _| step[first + axis]);
         stretch[v] += step[first + 3];
     }
-    largest
+    step.rows(0, unknowns.offsets).amax()
 }

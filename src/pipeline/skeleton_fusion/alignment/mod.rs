@@ -43,7 +43,7 @@ pub use tuning::AlignmentTuning;
 /// Steps of Gauss and Newton at the most; five are usual.
 const MAX_ITERATIONS: usize = 20;
 /// Largest change of a rotation, radians, under which the steps have come to an end.
-const CONVERGED: f64 = 1e-4;
+const CONVERGED: f64 = 5e-4;
 /// Largest rotation of one step, radians: further away the equations are no longer what they were.
 const LARGEST_STEP: f64 = 0.3;
 
@@ -233,6 +233,11 @@ impl Alignment {
         self.tilt * heading * earth_from_imu.to_rotation_matrix() * found.imu_from_bone
     }
 
+    /// True when every mounting was begun from the scheme.
+    fn is_by_scheme(&self) -> bool {
+        self.units.iter().all(|unit| unit.mounting == MountingFound::Scheme)
+    }
+
     /// Covariance of two unknowns.
     pub(super) fn covariance_of(&self, i: usize, j: usize) -> f64 {
         self.covariance[(i, j)]
@@ -272,7 +277,10 @@ pub struct Evidence<'a> {
 
 /// Solves for mounting, heading and tilt. `None` when the equations have no solution, which only numbers that are not
 /// finite can bring about.
-pub fn align(evidence: &Evidence<'_>, tuning: &AlignmentTuning) -> Option<Alignment> {
+///
+/// `earlier` is a solution from more moments of the same units. It is begun from where the mountings are by the scheme; where
+/// they had to be found, moments that do not count any more may have misled it.
+pub fn align(evidence: &Evidence<'_>, tuning: &AlignmentTuning, earlier: Option<&Alignment>) -> Option<Alignment> {
     let vectors = BoneVector::all();
     let (starts, plank_heading) = starts(evidence, &vectors);
     let units = evidence.motions.iter().zip(&starts).enumerate().map(|(u, (motion, start))| UnitAlignment {
@@ -293,6 +301,14 @@ pub fn align(evidence: &Evidence<'_>, tuning: &AlignmentTuning) -> Option<Alignm
         covariance: DMatrix::zeros(0, 0),
         unknowns,
     };
+    if let Some(earlier) = earlier.filter(|earlier| earlier.is_by_scheme() && alignment.is_by_scheme()) {
+        alignment.tilt = earlier.tilt;
+        alignment.plank_heading = earlier.plank_heading;
+        for (unit, before) in alignment.units.iter_mut().zip(&earlier.units) {
+            unit.imu_from_bone = before.imu_from_bone;
+            unit.headings.clone_from(&before.headings);
+        }
+    }
     let mut stretch = vec![0.0; vectors.len()];
     for iteration in 0..MAX_ITERATIONS {
         let equations = equations::assemble(evidence, &vectors, &alignment, &stretch, tuning);

@@ -73,7 +73,7 @@ impl Exact {
             plank: None,
             mounting,
         };
-        align(&evidence, &AlignmentTuning::default()).unwrap()
+        align(&evidence, &AlignmentTuning::default(), None).unwrap()
     }
 
     /// Largest error of a bone's attitude over the minute, degrees.

@@ -44,7 +44,7 @@ pub(super) struct Fit {
     pub line: Line,
     pub offset_sd_s: f64,
     pub drift_sd: f64,
-    /// Root mean square of the residuals of the windows that agree, seconds.
+    /// Root mean square of the residuals of the windows that agree, weighted by what each tells, seconds.
     pub residual_s: f64,
     /// Of each observation, whether it agrees with the line.
     pub agrees: Vec<bool>,
@@ -83,7 +83,9 @@ pub(super) fn fit(observations: &[Observation]) -> Option<Fit> {
     let agreeing = || observations.iter().zip(&agrees).filter(|(_, agrees)| **agrees).map(|(o, _)| o);
     let n = agreeing().count() as f64;
     let mean = |f: &dyn Fn(&Observation) -> f64| agreeing().map(f).sum::<f64>() / n.max(1.0);
-    let residual_s = mean(&|o| residual(&line, o).powi(2)).sqrt();
+    // A window that tells the lag to 25 ms may be off by 25 ms and says nothing of the map.
+    let precision = mean(&|o| 1.0 / variance(o));
+    let residual_s = (mean(&|o| residual(&line, o).powi(2) / variance(o)) / precision.max(f64::MIN_POSITIVE)).sqrt();
     // Windows that scatter more than their variances say make the line less certain, never more. A single
     // one shows no scatter; two parameters are taken from the rest.
     let freedom = n / (n - 2.0).max(1.0);

@@ -99,7 +99,7 @@ pub enum Evidence {
 pub struct Alignment {
     /// The map.
     pub clock: ClockMap,
-    /// Root mean square by which single windows differ from the map, seconds.
+    /// Root mean square by which single windows differ from the map, weighted by what each tells, seconds.
     pub residual_s: f64,
     /// Windows that agree with the map, force and rate counted apart.
     pub n_windows: usize,
