@@ -20,6 +20,7 @@
 //! | [`pipeline`] | recording → assessment, pure |
 //! | [`synthetic`] | recordings with known truth |
 //! | [`evaluation`] | agreement with a reference |
+//! | [`fall_risk`] | rules with id, unit, citation |
 //! | [`storage`] | SQLite rows, blobs of bytes |
 //! | [`queue`] | durable jobs |
 //! | [`worker`] | claim, load, assess, save |
@@ -46,6 +47,7 @@ pub mod cli;
 pub mod config;
 pub mod estimation;
 pub mod evaluation;
+pub mod fall_risk;
 pub mod geometry;
 pub mod pipeline;
 pub mod progress;

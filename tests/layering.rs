@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The house, top to bottom, as in `src/lib.rs`.
-const HOUSE: [&str; 16] = [
+const HOUSE: [&str; 17] = [
     "geometry",
     "estimation",
     "signal",
@@ -16,6 +16,7 @@ const HOUSE: [&str; 16] = [
     "pipeline",
     "synthetic",
     "evaluation",
+    "fall_risk",
     "storage",
     "queue",
     "worker",

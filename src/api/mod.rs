@@ -10,6 +10,7 @@ pub mod clients;
 mod docs;
 pub mod error;
 pub mod etag;
+pub mod fall_risk;
 pub mod health;
 pub mod jobs;
 pub mod metrics;
@@ -81,6 +82,7 @@ fn documented_routes() -> OpenApiRouter<AppState> {
         .merge(assessments::router())
         .merge(series::router())
         .merge(noise_models::router())
+        .merge(fall_risk::router())
         .merge(clients::router())
         .merge(health::router())
         .merge(metrics::router())

@@ -21,6 +21,11 @@ revokes keys. What belongs to another organisation does not exist: 404.
 **Noise models** say how far a sensor is off. Settings name one that is shipped, or one that the organisation trained \
 (`POST /v1/noise-models`); a session may name the one of its sensor.
 
+**Fall risk.** A clinician adds answers (`POST /v1/patients/{id}/questionnaires`) and results of tests (`POST \
+/v1/patients/{id}/measurements`); `GET /v1/patients/{id}/fall-risk` applies every rule of `GET /v1/fall-risk-rules` to \
+what is known. Each finding stands alone, with its limit, interval, source and population; what is not known is \
+`unknown`, never `negative`.
+
 **Refusals** are problem documents (RFC 9457, `application/problem+json`) with a stable `code`, a sentence for a \
 person, and the paths of the fields concerned.
 
@@ -38,6 +43,7 @@ person, and the paths of the fields concerned.
         (name = "recordings", description = "Uploads and their bytes"),
         (name = "jobs", description = "The work on a recording"),
         (name = "assessments", description = "What was found in a recording"),
+        (name = "fall risk", description = "What was answered and measured, and what published rules make of it"),
         (name = "noise models", description = "Noise of sensors, shipped and trained"),
         (name = "clients", description = "Holders of keys"),
         (name = "health", description = "For the operator"),

@@ -65,6 +65,10 @@ ids! {
     AssessmentId;
     /// Identity of a noise model: one version of one name.
     NoiseModelId;
+    /// Identity of a questionnaire: one set of answers of a patient.
+    QuestionnaireId;
+    /// Identity of a measurement: results of tests of a patient on one occasion.
+    MeasurementId;
 }
 
 #[cfg(test)]

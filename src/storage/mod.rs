@@ -18,6 +18,7 @@ pub mod blobs;
 pub mod clients;
 pub mod clock;
 pub mod error;
+pub mod fall_risk;
 pub mod id;
 pub mod idempotency;
 mod known_keys;
@@ -36,7 +37,11 @@ pub use blobs::{BlobReader, BlobStore, BlobWriter, SealedBlob, StoredBlob};
 pub use clients::{ApiKey, Client, Role};
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use error::StorageError;
-pub use id::{AssessmentId, ClientId, JobId, NoiseModelId, OrganisationId, PatientId, RecordingId, SessionId};
+pub use fall_risk::{StoredAnswers, StoredMeasures};
+pub use id::{
+    AssessmentId, ClientId, JobId, MeasurementId, NoiseModelId, OrganisationId, PatientId, QuestionnaireId,
+    RecordingId, SessionId,
+};
 pub use idempotency::StoredResponse;
 pub use noise_models::StoredNoiseModel;
 pub use organisations::Organisation;

@@ -6,6 +6,7 @@
 mod assessments;
 mod clients;
 mod events;
+mod fall_risk;
 mod fusion;
 mod health;
 mod jobs;
