@@ -10,6 +10,7 @@ pub mod key;
 mod method;
 mod noise_model;
 pub mod openapi;
+mod overlay;
 pub mod serve;
 pub mod simulate;
 pub mod simulate_walker;
