@@ -99,9 +99,6 @@ impl ColourCue {
     ) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0u32);
         for (template, sums) in self.templates.views.iter().zip(&self.sums) {
-            if scratch.outlines.len() != SOLID_COUNT {
-                scratch.outlines = vec![Outlines::new(sums.width); SOLID_COUNT];
-            }
             let regions = regions(simd, solids, template, sums, scratch)?;
             for (template, region) in template.segments.iter().zip(&regions) {
                 let Some(template) = template else { continue };
@@ -135,6 +132,9 @@ fn regions<S: Simd>(
     });
     if !moved.iter().all(is_in_front) {
         return None;
+    }
+    if scratch.outlines.len() != SOLID_COUNT {
+        scratch.outlines = vec![Outlines::new(sums.width); SOLID_COUNT];
     }
     let (mut first, mut last) = (sums.width, 0);
     for (solid, outlines) in moved.iter().zip(&mut scratch.outlines) {
