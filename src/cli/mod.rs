@@ -28,7 +28,6 @@ struct Cli {
     command: Command,
 }
 
-#[expect(clippy::large_enum_variant, reason = "there is one command in a run")]
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
