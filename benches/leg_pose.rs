@@ -4,6 +4,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use nalgebra::Vector3;
 use rayon::ThreadPoolBuilder;
 use std::hint::black_box;
+use surefoot::assessment::LegCues;
 use surefoot::body::legs::LegState;
 use surefoot::body::legs::constraints::stand;
 use surefoot::estimation::particle_filter::{ParticleModel, Particles};
@@ -11,9 +12,10 @@ use surefoot::estimation::random::RandomStreams;
 use surefoot::geometry::camera::{DepthMap, Intrinsics};
 use surefoot::geometry::floor::Floor;
 use surefoot::geometry::lanes::LANES;
+use surefoot::pipeline::leg_pose::foreground::Region;
 use surefoot::pipeline::leg_pose::paper::model::{LegParticleModel, Observation, PARTICLE_DIMENSION};
 use surefoot::pipeline::leg_pose::paper::render::render;
-use surefoot::pipeline::leg_pose::paper::{Cues, PaperSettings, Region, Tracker, TransitionNoise};
+use surefoot::pipeline::leg_pose::paper::{PaperSettings, Tracker, TransitionNoise};
 
 const CAMERA: Intrinsics = Intrinsics { fx: 585.0, fy: 585.0, cx: 319.5, cy: 239.5 };
 const REGION: Region = Region { depth: [0.0, 1.8], x: [-0.4, 0.4] };
@@ -32,7 +34,7 @@ fn scene() -> (Floor, LegState, DepthMap) {
     (floor, state, render(&solids, &CAMERA, SIZE.0, SIZE.1))
 }
 
-fn tracker(particles: usize, cues: Cues, floor: Floor) -> Tracker {
+fn tracker(particles: usize, cues: LegCues, floor: Floor) -> Tracker {
     let settings = PaperSettings { particles, cues, region: REGION, ..PaperSettings::default() };
     Tracker::new(settings, CAMERA, floor, DepthMap::empty(SIZE.0, SIZE.1))
 }
@@ -43,12 +45,12 @@ fn frames(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("leg_pose/frame");
     group.sample_size(10).throughput(Throughput::Elements(1));
     for (particles, cues, threads) in [
-        (5000, Cues::Both, 1),
-        (5000, Cues::Both, 2),
-        (5000, Cues::Distance, 2),
-        (5000, Cues::Projection, 2),
-        (2500, Cues::Both, 2),
-        (10_000, Cues::Both, 2),
+        (5000, LegCues::Both, 1),
+        (5000, LegCues::Both, 2),
+        (5000, LegCues::Distance, 2),
+        (5000, LegCues::Projection, 2),
+        (2500, LegCues::Both, 2),
+        (10_000, LegCues::Both, 2),
     ] {
         let Ok(pool) = ThreadPoolBuilder::new().num_threads(threads).build() else { continue };
         let mut tracker = tracker(particles, cues, floor);
@@ -70,7 +72,7 @@ fn frames(criterion: &mut Criterion) {
 fn weighing(criterion: &mut Criterion) {
     const COUNT: usize = 32 * LANES;
     let (floor, state, image) = scene();
-    let Ok(foreground) = tracker(COUNT, Cues::Both, floor).foreground(&image) else { return };
+    let Ok(foreground) = tracker(COUNT, LegCues::Both, floor).foreground(&image) else { return };
     let Some(observation) = Observation::new(foreground, CAMERA) else { return };
     let mut start = state.to_vector().as_slice().to_vec();
     start.resize(PARTICLE_DIMENSION, 0.0);
@@ -79,7 +81,7 @@ fn weighing(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("leg_pose/weigh");
     group.sample_size(20).throughput(Throughput::Elements(COUNT as u64));
     for (name, arch) in instruction_sets() {
-        for cues in Cues::ALL {
+        for cues in [LegCues::Distance, LegCues::Projection, LegCues::Both] {
             let mut model = LegParticleModel::new(floor, cues, &TransitionNoise::default()).with_arch(arch);
             model.propagate(1.0 / 30.0, &mut RandomStreams::new(1), &mut particles);
             let mut logs = vec![0.0; COUNT];

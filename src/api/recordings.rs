@@ -9,7 +9,7 @@ use super::page::{DEFAULT_LIMIT, Page, PageLink, id_from_cursor};
 use super::request::{ApiJson, ApiPath, ApiQuery};
 use super::sessions::SessionPath;
 use super::state::AppState;
-use crate::assessment::{LegPoseMode, LegPoseSettings, Settings, SkeletonFusionSettings};
+use crate::assessment::{LegPoseSettings, Settings, SkeletonFusionSettings};
 use crate::recording::decode::Inspection;
 use crate::storage::{
     BlobReader, ClientId, PageRequest, PatientId, RecordingFilter, RecordingId, SessionId, StoredRecording,
@@ -137,9 +137,6 @@ impl Validate for JobRequest {
 
 fn validate_leg_pose(settings: &LegPoseSettings, parent: &mut dyn FnMut() -> garde::Path, report: &mut garde::Report) {
     let mut refuse = |field: &str, message: &str| report.append(parent().join(field), garde::Error::new(message));
-    if settings.mode == LegPoseMode::Paper {
-        refuse("mode", "must be fitted: paper is not available");
-    }
     if !(64..=65_536).contains(&settings.particles) {
         refuse("particles", "must lie between 64 and 65536");
     }

@@ -27,15 +27,36 @@ pub enum LegCues {
     /// The product of both.
     #[default]
     Both,
+    /// The paper's comparison: colours and gradients in two cameras at the sides, which the recording must then have.
+    Rgb,
 }
 
 impl LegCues {
+    /// Every choice, in the order of the paper's tables.
+    pub const ALL: [LegCues; 4] = [LegCues::Distance, LegCues::Projection, LegCues::Both, LegCues::Rgb];
+
+    /// True when cue 1 counts.
+    pub fn has_distance(self) -> bool {
+        matches!(self, LegCues::Distance | LegCues::Both)
+    }
+
+    /// True when cue 2 counts.
+    pub fn has_projection(self) -> bool {
+        matches!(self, LegCues::Projection | LegCues::Both)
+    }
+
+    /// True when the cameras at the sides count.
+    pub fn has_colour(self) -> bool {
+        self == LegCues::Rgb
+    }
+
     /// Name in settings and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             LegCues::Distance => "distance",
             LegCues::Projection => "projection",
             LegCues::Both => "both",
+            LegCues::Rgb => "rgb",
         }
     }
 }
@@ -55,7 +76,9 @@ impl LegPoseMode {
 
 /// A way of tracking legs that does not exist.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no way of tracking legs; there are fitted and paper, with the cues distance, projection and both")]
+#[error(
+    "`{0}` is no way of tracking legs; there are fitted and paper, with the cues distance, projection, both and rgb"
+)]
 pub struct UnknownLegPoseMode(pub String);
 
 impl FromStr for LegPoseMode {
@@ -70,8 +93,7 @@ impl FromStr for LegCues {
     type Err = UnknownLegPoseMode;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        let all = [LegCues::Distance, LegCues::Projection, LegCues::Both];
-        all.into_iter().find(|m| m.name() == name).ok_or_else(|| UnknownLegPoseMode(name.to_owned()))
+        Self::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| UnknownLegPoseMode(name.to_owned()))
     }
 }
 

@@ -3,8 +3,10 @@
 use super::assess_legs;
 use super::method::AnyMethod;
 use super::noise_model::NoiseModelChoice;
+use super::overlay::{self, FrameRange};
 use crate::assessment::{
-    Assessment, JointAngleSettings, LegPoseSettings, Method, Pass, Settings, SkeletonFusionSettings,
+    Assessment, JointAngleSettings, LegCues, LegPoseMode, LegPoseSettings, Method, Pass, Settings,
+    SkeletonFusionSettings,
 };
 use crate::estimation::orientation_filter::OrientationMethod;
 use crate::pipeline::{self, Inputs};
@@ -28,13 +30,16 @@ use std::time::Duration;
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Examples:\n  surefoot assess squat.mcap\n  surefoot assess squat.mcap --csv angles.csv\n  \
     surefoot assess squat.json --method particle --particles 2048 --json\n  \
-    surefoot assess squat.mcap --noise-model kinect-v2\n  surefoot assess kick-with-units.mcap --method hierarchy")]
+    surefoot assess squat.mcap --noise-model kinect-v2\n  surefoot assess kick-with-units.mcap --method hierarchy\n  \
+    surefoot assess walk.mcap --frames legs.csv --overlay pictures --frames-range 100..130\n  \
+    surefoot assess walk.mcap --method paper --cues both --particles 5000")]
 pub struct Args {
     /// Recording, .mcap or .json; the content decides
     recording: PathBuf,
     /// Of skeletons: iekf, ukf (unscented), guided (particles that look before they leap), particle (the paper's particle
     /// filter), ik (closed geometry), nite (middleware's rotations). With inertial units: fused, hierarchy (the paper's
-    /// fusion), camera (alone), inertial (units alone) [default: fused where units are worn, otherwise iekf]
+    /// fusion), camera (alone), inertial (units alone). Of depth images: fitted, paper (its particle filter) [default: by
+    /// the recording, fitted, fused or iekf]
     #[arg(long, value_name = "METHOD")]
     method: Option<AnyMethod>,
     /// Orientation filter of inertial units: smoother, vqf, madgwick, gyroscope; the method's own choice when absent
@@ -49,9 +54,13 @@ pub struct Args {
     /// smooth (over the whole recording; the default of methods that can) or filter (from the frames up to each)
     #[arg(long, value_name = "PASS")]
     pass: Option<Pass>,
-    /// Particles of particle (512 when not given) and guided (96)
+    /// Particles of particle (512 when not given), guided (96) and paper (5000)
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "N")]
     particles: Option<u32>,
+    /// What weighs the particles of paper: distance (cue 1), projection (cue 2), both, or rgb (two cameras at the sides)
+    /// [default: both]
+    #[arg(long, value_name = "CUES")]
+    cues: Option<LegCues>,
     /// Seed of the random streams
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -65,6 +74,12 @@ pub struct Args {
     /// Of depth images: write each frame's ankles, knees and hips (camera's axes, metres), step length and width as CSV
     #[arg(long, value_name = "FILE")]
     frames: Option<PathBuf>,
+    /// Of depth images: draw the legs over them, as a picture that moves (legs.png, APNG) in this folder
+    #[arg(long, value_name = "DIR")]
+    overlay: Option<PathBuf>,
+    /// Draw these frames only, from A to before B, and each of them also as a picture of its own
+    #[arg(long, value_name = "A..B", requires = "overlay")]
+    frames_range: Option<FrameRange>,
     /// Print summary, quality and provenance as JSON
     #[arg(long)]
     json: bool,
@@ -75,13 +90,23 @@ pub struct Args {
 /// # Errors
 /// When the file is not a recording, or has no assessment; the sentence says where and what to do.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    if args.method.is_none()
-        && let Some(assessment) = assess_legs::assess(&args.recording, &LegPoseSettings::default())?
+    if let None | Some(AnyMethod::LegPose(_)) = args.method
+        && let Some((assessment, track)) = assess_legs::assess(&args.recording, || leg_settings(args))?
     {
+        if let Some(folder) = &args.overlay {
+            overlay::write(&args.recording, &track, folder, args.frames_range.as_ref())
+                .with_context(|| format!("cannot draw into {}", folder.display()))?;
+        }
         return write(args, &assessment);
     }
-    if args.frames.is_some() {
-        bail!("--frames is of depth images, and {} has none", args.recording.display());
+    let of_depth = [
+        (args.frames.is_some(), "--frames"),
+        (args.overlay.is_some(), "--overlay"),
+        (args.cues.is_some(), "--cues"),
+        (matches!(args.method, Some(AnyMethod::LegPose(_))), "this method"),
+    ];
+    if let Some((_, what)) = of_depth.iter().find(|(is_asked, _)| *is_asked) {
+        bail!("{what} is of depth images, and {} has none", args.recording.display());
     }
     let bytes = fs::read(&args.recording).with_context(|| format!("cannot read {}", args.recording.display()))?;
     let recording = recording_of(&bytes).with_context(|| args.recording.display().to_string())?;
@@ -117,6 +142,23 @@ fn write(args: &Args, assessment: &Assessment) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The settings of the leg-pose pipeline that the arguments ask for.
+fn leg_settings(args: &Args) -> anyhow::Result<LegPoseSettings> {
+    let mode = match args.method {
+        Some(AnyMethod::LegPose(mode)) => mode,
+        _ => LegPoseMode::default(),
+    };
+    if mode != LegPoseMode::Paper && (args.cues.is_some() || args.particles.is_some()) {
+        bail!("--cues and --particles are of --method paper; add it, or leave them out");
+    }
+    let default = LegPoseSettings::default();
+    let particles = args.particles.unwrap_or(default.particles);
+    if !(64..=65_536).contains(&particles) {
+        bail!("--particles is {particles}, but for depth images must lie between 64 and 65536");
+    }
+    Ok(LegPoseSettings { mode, cues: args.cues.unwrap_or_default(), particles, seed: args.seed, ..default })
+}
+
 /// The settings that the arguments ask for; what they leave open depends on the recording.
 fn settings(args: &Args, recording: &Recording) -> anyhow::Result<Settings> {
     let units = recording.inertial.iter().flat_map(|inertial| &inertial.sensors).map(|sensor| sensor.segment);
@@ -133,6 +175,7 @@ fn settings(args: &Args, recording: &Recording) -> anyhow::Result<Settings> {
         AnyMethod::Fusion(_) if of_angles => {
             bail!("--pass, --particles and --noise-model are of skeletons alone; add --method iekf, or leave them out")
         }
+        AnyMethod::LegPose(_) => Ok(Settings::LegPose(leg_settings(args)?)),
         AnyMethod::JointAngles(method) => Ok(Settings::JointAngles(JointAngleSettings {
             method,
             pass: args.pass,

@@ -1,7 +1,7 @@
 //! `surefoot assess` on depth images: legs and steps, with memory that does not grow with the recording.
 
 use crate::assessment::{Assessment, LegPoseSettings};
-use crate::pipeline::leg_pose;
+use crate::pipeline::leg_pose::{self, Track};
 use crate::progress::Monitor;
 use crate::recording::decode::{DepthReader, Limits};
 use anyhow::{Context, anyhow};
@@ -13,14 +13,19 @@ use std::path::Path;
 /// Bytes of the file that are read at a time.
 const PIECE: usize = 64 * 1024;
 
-/// The assessment of a recording that has depth images; none of one that has not.
+/// The assessment of a recording that has depth images, with its track; none of one that has not. Settings are asked for
+/// when there are such images.
 ///
 /// # Errors
 /// Code, place and sentence of the first defect, or why there is no assessment.
-pub(super) fn assess(path: &Path, settings: &LegPoseSettings) -> anyhow::Result<Option<Assessment>> {
+pub(super) fn assess(
+    path: &Path,
+    settings: impl FnOnce() -> anyhow::Result<LegPoseSettings>,
+) -> anyhow::Result<Option<(Assessment, Track)>> {
     let open = || File::open(path).with_context(|| format!("cannot read {}", path.display()));
     let Ok(reader) = DepthReader::open(BufReader::new(open()?), &Limits::default()) else { return Ok(None) };
-    let mut assessment = leg_pose::assess(reader, settings, &Monitor::default()).map_err(|error| anyhow!("{error}"))?;
+    let assessed = leg_pose::assess_with_track(reader, &settings()?, &Monitor::default());
+    let (mut assessment, track) = assessed.map_err(|error| anyhow!("{error}"))?;
     let mut digest = Sha256::new();
     let mut file = open()?;
     let mut piece = vec![0; PIECE];
@@ -32,7 +37,7 @@ pub(super) fn assess(path: &Path, settings: &LegPoseSettings) -> anyhow::Result<
         digest.update(&piece[..n]);
     }
     assessment.provenance.recording_sha256 = hex::encode(digest.finalize());
-    Ok(Some(assessment))
+    Ok(Some((assessment, track)))
 }
 
 /// Writes the joints and step measures of every frame: metres, empty where there is no estimate.

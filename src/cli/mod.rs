@@ -10,6 +10,7 @@ pub mod key;
 mod method;
 mod noise_model;
 pub mod openapi;
+mod overlay;
 pub mod serve;
 pub mod simulate;
 pub mod simulate_walker;
@@ -27,7 +28,6 @@ struct Cli {
     command: Command,
 }
 
-#[expect(clippy::large_enum_variant, reason = "there is one command in a run")]
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),

@@ -5,6 +5,7 @@
 
 pub mod attitude;
 pub mod camera;
+pub mod colour_image;
 pub mod euler;
 pub mod floor;
 pub mod lanes;

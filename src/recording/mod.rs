@@ -11,6 +11,7 @@ pub mod error;
 pub mod import;
 pub mod inertial;
 pub mod inertial_quality;
+pub mod side_camera;
 pub mod skeleton;
 
 pub use decode::{Format, Inspection, Inspector, Limits, decode};

@@ -64,6 +64,53 @@ async fn depth_images_of_a_walk_give_steps_and_the_places_of_the_joints() {
     assert!(depths.iter().filter(|z| z.is_number()).count() as u64 * 10 > N_FRAMES * 9, "{depths:?}");
 }
 
+/// The first images of a walk.
+static START: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let settings = WalkerSettings::of_seed(Course::Straight, 2).with_speed(0.8);
+    let settings = WalkerSettings { duration_s: 1.0, rate_hz: 8.0, ..settings };
+    let simulation = WalkerSimulation::new(&settings, trousers()).unwrap();
+    simulation.write(Cursor::new(Vec::new()), |_| {}).unwrap().into_inner()
+});
+
+/// Asks for another assessment of a recording and answers the job after it has run.
+async fn assessed_again(app: &TestApp, upload: &Value, settings: Value) -> Value {
+    let path = format!("/v1/recordings/{}/jobs", text(&upload["recording"]["id"]));
+    let job = app.post(&path).json(&settings).send().await.expect(StatusCode::ACCEPTED);
+    app.run_pending_jobs().await;
+    app.get(&format!("/v1/jobs/{}", text(&job["id"]))).send().await.expect(StatusCode::OK)
+}
+
+#[tokio::test]
+async fn the_papers_particle_filter_gives_the_same_channels_when_it_is_asked_for_and_says_how_it_was_set() {
+    let app = TestApp::new().await;
+    let (upload, _) = assessed(&app, START.clone()).await;
+    let settings = json!({"pipeline": "leg_pose", "mode": "paper", "cues": "both", "particles": 256, "seed": 7});
+    let job = assessed_again(&app, &upload, settings).await;
+    assert_eq!(job["state"], "done", "{job:#}");
+    let path = format!("/v1/assessments/{}", text(&job["assessment_id"]));
+    let assessment = app.get(&path).send().await.expect(StatusCode::OK);
+    assert_eq!((&assessment["pipeline"], &assessment["method"]), (&json!("leg_pose"), &json!("paper")));
+    assert_eq!(assessment["n_samples"], 8);
+    assert_eq!(assessment["channels"].as_array().unwrap().len(), 22);
+    assert_eq!(assessment["quality"]["effective_sample_size"]["particles"], 256);
+    let set = &assessment["provenance"]["settings"];
+    assert_eq!((&set["mode"], &set["cues"], &set["seed"]), (&json!("paper"), &json!("both"), &json!(7)), "{set:#}");
+    assert!(assessment["gait"]["steps"].is_array());
+
+    let series = format!("{path}/series?channels=left_ankle_z_m");
+    let series = app.get(&series).send().await.expect(StatusCode::OK);
+    let depths = series["channels"][0]["value"].as_array().unwrap();
+    assert!(depths.iter().all(|z| z.as_f64().is_some_and(|z| (0.5..2.0).contains(&z))), "{depths:?}");
+}
+
+#[tokio::test]
+async fn the_colour_cue_of_a_recording_without_colour_is_refused_with_what_to_ask_instead() {
+    let app = TestApp::new().await;
+    let (upload, _) = assessed(&app, START.clone()).await;
+    let job = assessed_again(&app, &upload, json!({"pipeline": "leg_pose", "mode": "paper", "cues": "rgb"})).await;
+    assert_eq!((&job["state"], &job["error"]["code"]), (&json!("failed"), &json!("no_side_images")), "{job:#}");
+}
+
 #[tokio::test]
 async fn half_a_depth_recording_is_refused_and_makes_no_job() {
     let app = TestApp::new().await;

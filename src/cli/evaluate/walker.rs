@@ -1,7 +1,8 @@
 //! `surefoot evaluate walker`: tracked legs beside the truth of simulated walks.
 
-use crate::assessment::LegPoseSettings;
-use crate::evaluation::walker::{MethodErrors, evaluate};
+use crate::evaluation::walker::MethodErrors;
+use crate::evaluation::walker::comparison::{WalkError, compare};
+use crate::evaluation::walker::method::WalkerMethod;
 use crate::synthetic::walker::cesium::body_from_glb;
 use crate::synthetic::walker::{Course, WalkerSettings, WalkerSimulation};
 use anyhow::Context;
@@ -16,7 +17,8 @@ use std::path::PathBuf;
 /// has no model and no filter: the foreground is split into two legs, and the lowest part of each is the foot.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  surefoot evaluate walker\n  surefoot evaluate walker --seeds 3 --missing 0.3 --json"
+    after_help = "Examples:\n  surefoot evaluate walker\n  surefoot evaluate walker --seeds 3 --missing 0.3 --json\n  \
+    surefoot evaluate walker --methods baseline,fitted,cue1,cue2,both,rgb --particles 5000"
 )]
 pub(super) struct WalkerArgs {
     /// The figure that walks [default: depth/assets/CesiumMan.glb below $SUREFOOT_DATA, else ../shared/data]
@@ -34,6 +36,12 @@ pub(super) struct WalkerArgs {
     /// Length of each sequence, seconds
     #[arg(long, default_value_t = 10.0, value_name = "S")]
     seconds: f64,
+    /// Methods to compare, separated by commas: baseline, fitted (the default), and the paper's cue1, cue2, both, rgb
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', default_value = "baseline,fitted")]
+    methods: Vec<WalkerMethod>,
+    /// Particles of the paper's methods
+    #[arg(long, default_value_t = 5000, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=65536))]
+    particles: u32,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -56,7 +64,7 @@ pub(super) fn run(args: &WalkerArgs, out: &mut dyn Write) -> anyhow::Result<()> 
         settings.duration_s = args.seconds;
         settings.errors.missing_share = args.missing;
         let simulation = WalkerSimulation::new(&settings, body.clone())?;
-        sequences.push((seed, evaluate(&simulation, &LegPoseSettings::default())));
+        sequences.push((seed, compare(&simulation, &args.methods, args.particles)));
     }
     if args.json {
         let documents: Vec<serde_json::Value> = sequences
@@ -87,6 +95,41 @@ pub(super) fn run(args: &WalkerArgs, out: &mut dyn Write) -> anyhow::Result<()> 
         out,
         "\nMean absolute error (standard deviation) with both feet on the floor; all frames: length / width."
     )?;
+    write_paper_table("Step length error, cm (Table 2 of the paper)", &args.methods, &sequences, |e| e.length_m, out)?;
+    write_paper_table("Step width error, cm (Table 3 of the paper)", &args.methods, &sequences, |e| e.width_m, out)?;
+    Ok(())
+}
+
+/// A walk and what became of it.
+type Sequence = (u64, Result<Vec<MethodErrors>, WalkError>);
+
+/// Mean and standard deviation by walk and method, in the shape of the paper's tables; below them the means over the walks.
+fn write_paper_table(
+    title: &str,
+    methods: &[WalkerMethod],
+    sequences: &[Sequence],
+    value: fn(&MethodErrors) -> [f64; 2],
+    out: &mut dyn Write,
+) -> std::io::Result<()> {
+    let mut line = |first: &str, second: &str, cells: &mut dyn Iterator<Item = String>| {
+        write!(out, "{first:<6}{second:<6}")?;
+        for cell in cells {
+            write!(out, "{cell:>10}")?;
+        }
+        writeln!(out)
+    };
+    line(&format!("\n{title}"), "", &mut std::iter::empty())?;
+    line("walk", "", &mut methods.iter().map(|method| method.name().to_owned()))?;
+    let cell = |metres: f64| format!("{:.2}", 100.0 * metres);
+    let found: Vec<_> = sequences.iter().filter_map(|(seed, outcome)| Some((seed, outcome.as_ref().ok()?))).collect();
+    for (seed, methods) in &found {
+        line(&seed.to_string(), "Mean", &mut methods.iter().map(|errors| cell(value(errors)[0])))?;
+        line("", "Std", &mut methods.iter().map(|errors| cell(value(errors)[1])))?;
+    }
+    if found.len() > 1 {
+        let mean = |k: usize| found.iter().map(|(_, methods)| value(&methods[k])[0]).sum::<f64>() / found.len() as f64;
+        line("all", "Mean", &mut (0..methods.len()).map(|k| cell(mean(k))))?;
+    }
     Ok(())
 }
 
@@ -117,4 +160,32 @@ fn document(errors: &MethodErrors) -> serde_json::Value {
         "ankle_error_m": errors.ankle_m,
         "n_lost": errors.n_lost,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tables_have_a_mean_and_a_deviation_for_each_walk_and_a_column_for_each_method() {
+        let errors = |method, mean: f64| MethodErrors {
+            method,
+            n_frames: [10, 10],
+            length_m: [mean, 0.01],
+            width_m: [0.5 * mean, 0.02],
+            all_frames_m: [mean; 2],
+            ankle_m: None,
+            n_lost: 0,
+        };
+        let methods: Vec<WalkerMethod> = ["cue1", "both"].map(|name| name.parse().unwrap()).into();
+        let walk = |seed, mean| (seed, Ok(vec![errors("cue1", 2.0 * mean), errors("both", mean)]));
+        let mut out = Vec::new();
+        write_paper_table("Step length", &methods, &[walk(4, 0.02), walk(7, 0.04)], |e| e.length_m, &mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let words: Vec<Vec<&str>> = text.lines().skip(2).map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(words[0], ["walk", "cue1", "both"]);
+        assert_eq!(words[1], ["4", "Mean", "4.00", "2.00"]);
+        assert_eq!(words[2], ["Std", "1.00", "1.00"]);
+        assert_eq!(words[5], ["all", "Mean", "6.00", "3.00"]);
+    }
 }

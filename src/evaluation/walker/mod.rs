@@ -1,5 +1,8 @@
 //! Tracked legs beside the truth of simulated walks, and beside the baseline.
 
+pub mod comparison;
+pub mod method;
+
 use crate::assessment::LegPoseSettings;
 use crate::body::Side;
 use crate::geometry::camera::Intrinsics;

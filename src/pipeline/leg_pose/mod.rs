@@ -24,6 +24,7 @@ pub mod surface_fit;
 pub mod tracker;
 pub mod two_legs;
 
+use crate::assessment::quality::EffectiveSampleSize;
 use crate::assessment::{Assessment, LegPoseMode, LegPoseSettings};
 use crate::body::Side;
 use crate::geometry::camera::{DepthMap, Intrinsics};
@@ -31,10 +32,12 @@ use crate::pipeline::PipelineError;
 use crate::progress::{Monitor, Step};
 use crate::recording::DecodeError;
 use crate::recording::depth::{DepthImage, DepthReader, DepthUnit};
+use crate::recording::side_camera::{SideCamera, SideImages};
 use floor::Floor;
 use foreground::{Foreground, Preparation, Region};
 use leg_model::{LegPoint, LegSegment, POINTS, ShapeVector, adult_shape, adult_shape_deviation, point_of};
 use nalgebra::Vector3;
+use paper::PaperRun;
 use smoother::{SmoothedFrame, Smoother};
 use std::io::Read;
 use surface_fit::SEGMENTS;
@@ -66,6 +69,14 @@ pub trait DepthFrames {
     fn intrinsics(&self) -> Option<Intrinsics>;
     /// The scene without the person, when there is such an image.
     fn background(&self) -> Option<&DepthImage>;
+    /// The colour cameras at the sides, when there are any.
+    fn side_cameras(&self) -> Option<&[SideCamera; 2]> {
+        None
+    }
+    /// What they saw at the time of the last image.
+    fn side_images(&self) -> Option<&SideImages> {
+        None
+    }
 }
 
 impl<R: Read> DepthFrames for DepthReader<R> {
@@ -145,6 +156,8 @@ pub struct Track {
     pub shape: Option<ShapeVector>,
     /// Every frame of the recording.
     pub frames: Vec<TrackedFrame>,
+    /// Effective sample size of a tracker with particles.
+    pub effective_sample_size: Option<EffectiveSampleSize>,
     /// Mean share of pixels without depth, 0 to 1.
     pub missing: f64,
     /// Mean share of seen pixels that are as in the background, 0 to 1; none without a background.
@@ -161,12 +174,21 @@ pub fn assess(
     settings: &LegPoseSettings,
     monitor: &Monitor,
 ) -> Result<Assessment, PipelineError> {
-    if settings.mode == LegPoseMode::Paper {
-        return Err(PipelineError::unsuitable("mode_not_available", "only the mode `fitted` is available"));
-    }
+    Ok(assess_with_track(frames, settings, monitor)?.0)
+}
+
+/// As [`assess`], with the track that the assessment rests on.
+///
+/// # Errors
+/// As [`assess`].
+pub fn assess_with_track(
+    frames: impl DepthFrames,
+    settings: &LegPoseSettings,
+    monitor: &Monitor,
+) -> Result<(Assessment, Track), PipelineError> {
     let track = track(frames, settings, &mut |_, _| {}, monitor)?;
     monitor.begin(Step::Summarizing, 0)?;
-    report::assessment(&track, settings)
+    Ok((report::assessment(&track, settings)?, track))
 }
 
 /// Tracks a recording; `watch` sees each prepared frame.
@@ -187,12 +209,31 @@ pub fn track(
     };
     monitor.begin(Step::Calibrating, 0)?;
     let mut run = Run::start(&mut frames, camera, settings)?;
+    if settings.mode == LegPoseMode::Paper && settings.cues.has_colour() && frames.side_cameras().is_none() {
+        return Err(PipelineError::unsuitable(
+            "no_side_images",
+            "the cue `rgb` needs two colour cameras at the sides, and the recording has none; depth alone is weighed by \
+             `distance`, `projection` or `both`",
+        ));
+    }
+    let mut paper = (settings.mode == LegPoseMode::Paper).then(|| {
+        let background = frames.background().map(DepthImage::to_depth_map);
+        PaperRun::new(settings, camera, run.preparation.floor().clone(), background)
+    });
     while let Some((time_ns, foreground)) = run.next(&mut frames)? {
         watch(time_ns, &foreground);
-        run.take(time_ns, foreground);
+        match &mut paper {
+            Some(paper) => {
+                run.count(time_ns, &foreground);
+                // Of images that were read ahead, only the last one is of the time at which the sides are seen.
+                let sides = frames.side_cameras().zip(frames.side_images()).filter(|_| run.early.is_empty());
+                paper.take(time_ns, &run.map, sides);
+            }
+            None => run.take(time_ns, foreground),
+        }
         monitor.advance(1)?;
     }
-    Ok(run.finish())
+    Ok(run.finish(paper))
 }
 
 /// A recording half-way through.
@@ -256,18 +297,24 @@ impl Run {
     /// The next frame, prepared.
     fn next(&mut self, frames: &mut impl DepthFrames) -> Result<Option<(i64, Foreground)>, PipelineError> {
         if let Some((time_ns, map)) = self.early.pop_front() {
-            return Ok(Some((time_ns, self.preparation.prepare(&map))));
+            self.map = map;
+            return Ok(Some((time_ns, self.preparation.prepare(&self.map))));
         }
         let Some(time_ns) = frames.next_into(&mut self.image)? else { return Ok(None) };
         self.image.write_depth(&mut self.map);
         Ok(Some((time_ns, self.preparation.prepare(&self.map))))
     }
 
-    /// Tracks a frame, or lets it wait until the shape is known.
-    fn take(&mut self, time_ns: i64, foreground: Foreground) {
+    /// Notes what is known of a frame whoever tracks it.
+    fn count(&mut self, time_ns: i64, foreground: &Foreground) {
         self.times.push(time_ns);
         self.sums[0] += foreground.missing;
         self.sums[1] += foreground.unchanged;
+    }
+
+    /// Tracks a frame, or lets it wait until the shape is known.
+    fn take(&mut self, time_ns: i64, foreground: Foreground) {
+        self.count(time_ns, &foreground);
         if self.tracker.is_some() {
             self.track(time_ns, &foreground);
             return;
@@ -315,13 +362,21 @@ impl Run {
         }));
     }
 
-    fn finish(mut self) -> Track {
+    /// The track; `paper` has the legs when the paper's tracker found them.
+    fn finish(mut self, paper: Option<PaperRun>) -> Track {
         if self.tracker.is_none() && self.waiting_with_legs > 0 {
             self.begin_tracking();
         }
         let mut ready = Vec::new();
         self.smoother.finish(&mut ready);
         self.keep(ready);
+        let paper = paper.map(PaperRun::finish);
+        let mut shape = self.tracker.map(|(_, shape)| shape);
+        let mut effective_sample_size = None;
+        if let Some(paper) = paper {
+            (self.smoothed, shape) = (paper.frames, paper.shape);
+            effective_sample_size = paper.effective_sample_size;
+        }
         let mut tracked = self.smoothed.into_iter().peekable();
         let mut frames: Vec<TrackedFrame> = self
             .times
@@ -336,8 +391,9 @@ impl Run {
         Track {
             floor: self.preparation.floor().clone(),
             camera: *self.preparation.camera(),
-            shape: self.tracker.map(|(_, shape)| shape),
+            shape,
             frames,
+            effective_sample_size,
             missing: self.sums[0] / count,
             unchanged: self.has_background.then_some(self.sums[1] / count),
         }

@@ -155,6 +155,7 @@ fn quality(track: &Track, gait: &Gait) -> Quality {
         median_interval_s: intervals.get(intervals.len() / 2).copied().unwrap_or(0.0),
         longest_gap_s: intervals.last().copied().unwrap_or(0.0),
         coverage,
+        effective_sample_size: track.effective_sample_size,
         warnings: warnings(track, gait, coverage),
         events,
         event_counts: vec![count],

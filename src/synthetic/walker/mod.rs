@@ -20,6 +20,7 @@ mod raster;
 mod reference;
 mod scene;
 pub mod settings;
+pub mod side_cameras;
 pub mod trousers;
 pub mod truth;
 
@@ -67,6 +68,13 @@ pub struct WalkerSimulation {
     path: CameraPath,
     frame: Things,
     room: Things,
+}
+
+/// What is drawn, in `sensor`: the figure's triangles come first.
+struct Triangles {
+    corners: Vec<Point3<f64>>,
+    triangles: Vec<[u32; 3]>,
+    n_body: usize,
 }
 
 /// One frame and its truth.
@@ -225,6 +233,19 @@ impl WalkerSimulation {
     /// What an ideal camera sees; without a posture there is neither person nor room.
     fn view(&self, world_from_sensor: &Isometry3<f64>, posture: Option<&Posture>, frame: u64) -> View {
         let camera = &self.settings.camera;
+        let Triangles { corners, triangles, n_body } = self.triangles(world_from_sensor, posture);
+        let mut buffer = ZBuffer::new(WIDTH, HEIGHT);
+        for (number, triangle) in triangles.iter().enumerate() {
+            let [a, b, c] = triangle.map(|corner| &corners[corner as usize]);
+            buffer.draw(camera, [a, b, c], number as u32);
+        }
+        let up = world_from_sensor.inverse_transform_vector(&Vector3::y());
+        buffer.draw_plane(camera, &up, -self.settings.mount.height_m, FLOOR);
+        self.shaded(buffer, &corners, &triangles, n_body, &up, frame)
+    }
+
+    /// All there is but the floor, in `sensor`: the person and the room when there is a posture, then the walker's sides.
+    fn triangles(&self, world_from_sensor: &Isometry3<f64>, posture: Option<&Posture>) -> Triangles {
         let sensor_from_world = world_from_sensor.inverse();
         let mut corners: Vec<Point3<f64>> = Vec::new();
         let mut triangles: Vec<[u32; 3]> = Vec::new();
@@ -245,14 +266,7 @@ impl WalkerSimulation {
         for corner in &mut corners[first..] {
             *corner = self.sensor_from_walker(corner);
         }
-        let mut buffer = ZBuffer::new(WIDTH, HEIGHT);
-        for (number, triangle) in triangles.iter().enumerate() {
-            let [a, b, c] = triangle.map(|corner| &corners[corner as usize]);
-            buffer.draw(camera, [a, b, c], number as u32);
-        }
-        let up = sensor_from_world * Vector3::y();
-        buffer.draw_plane(camera, &up, -self.settings.mount.height_m, FLOOR);
-        self.shaded(buffer, &corners, &triangles, n_body, &up, frame)
+        Triangles { corners, triangles, n_body }
     }
 
     /// A point in the walker's axes (on the floor below the camera, x left, y up, z ahead) as the camera sees it.
@@ -317,20 +331,24 @@ impl WalkerSimulation {
         }
         let indices = self.body.triangles[triangle].map(|corner| corner as usize);
         let [a, b, c] = indices.map(|corner| corners[corner]);
-        let vertices = indices.map(|corner| &self.body.vertices[corner]);
-        if vertices[0].foot_share() > 0.5 {
+        if self.body.vertices[indices[0]].foot_share() > 0.5 {
             return false;
         }
-        let normal = (b - a).cross(&(c - a));
-        let area = normal.norm_squared();
-        let share = |u: &Point3<f64>, v: &Point3<f64>| (v - u).cross(&(point - u)).dot(&normal) / area;
-        let (wa, wb) = (share(&b, &c), share(&c, &a));
-        let rest =
-            vertices[0].rest.coords * wa + vertices[1].rest.coords * wb + vertices[2].rest.coords * (1.0 - wa - wb);
+        let rest = self.rest_at(triangle, [&a, &b, &c], point);
         let place = (rest / HOLE_M).into();
         let pattern = noise::smooth(self.settings.seed, place);
         let flicker = noise::smooth(self.settings.seed ^ frame.wrapping_mul(0x9e37_79b9), place);
         (1.0 - HOLE_FLICKER) * pattern + HOLE_FLICKER * flicker > hole_threshold(holes)
+    }
+
+    /// Where a point of one of the figure's triangles is at rest; point and corners in one frame.
+    fn rest_at(&self, triangle: usize, [a, b, c]: [&Point3<f64>; 3], point: &Point3<f64>) -> Vector3<f64> {
+        let normal = (b - a).cross(&(c - a));
+        let area = normal.norm_squared();
+        let share = |u: &Point3<f64>, v: &Point3<f64>| (v - u).cross(&(point - u)).dot(&normal) / area;
+        let (wa, wb) = (share(b, c), share(c, a));
+        let rest = self.body.triangles[triangle].map(|corner| self.body.vertices[corner as usize].rest.coords);
+        rest[0] * wa + rest[1] * wb + rest[2] * (1.0 - wa - wb)
     }
 }
 

@@ -8,15 +8,15 @@
 //! A raw step is a step of inverse depth (\[walker\] Eq. 1), so images in metres are compared as `1/z` and need no raw
 //! values. Where the background saw nothing, whatever the image sees is foreground, as with raw values.
 
-use super::settings::Region;
 use crate::geometry::camera::{DepthMap, Intrinsics};
 use crate::geometry::lanes::LANES;
+use crate::pipeline::leg_pose::foreground::Region;
 
 /// Inverse depth per raw step of a Kinect v1, 1/m (\[walker\] Eq. 1).
 const INVERSE_DEPTH_STEP: f32 = 0.00307;
 
 /// Cue 1 uses one foreground point of so many (\[walker\], section 4.4.1: 10 %).
-const SAMPLING: usize = 10;
+pub const SAMPLING: usize = 10;
 
 /// A prepared frame. Columns of the image are contiguous, because both the projections of upright legs and the loops
 /// over them run along columns.
@@ -123,12 +123,13 @@ impl Foreground {
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::PAPER_REGION;
     use super::*;
 
     const CAMERA: Intrinsics = Intrinsics { fx: 50.0, fy: 50.0, cx: 31.5, cy: 23.5 };
 
     fn found(image: &DepthMap, background: &DepthMap) -> Foreground {
-        Foreground::find(image, background, &CAMERA, &Region::default(), 4.0)
+        Foreground::find(image, background, &CAMERA, &PAPER_REGION, 4.0)
     }
 
     fn flat(z: f32) -> DepthMap {

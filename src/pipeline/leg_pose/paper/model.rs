@@ -10,10 +10,12 @@
 //! angle moves by `rate · Δt`, and ε has the variance of 1/30 s times Δt · 30. States are cut to their bounds and lifted
 //! or lowered until a foot stands on the floor; legs that go through each other have no weight.
 
+use super::colour_cue::{self, ColourCue, ColourScratch};
 use super::distance_cue::{self, DistanceCue, Distances};
 use super::foreground::Foreground;
 use super::projection_cue::{self, ProjectionCue, Scratch};
-use super::settings::{Cues, TransitionNoise};
+use super::settings::TransitionNoise;
+use crate::assessment::LegCues;
 use crate::body::legs::bounds::bounds;
 use crate::body::legs::constraints::{legs_intersect, stand};
 use crate::body::legs::solids::SOLID_COUNT;
@@ -42,13 +44,20 @@ pub struct Observation {
     foreground: Foreground,
     camera: Intrinsics,
     distance: DistanceCue,
+    colour: Option<ColourCue>,
 }
 
 impl Observation {
     /// The observation that a foreground is; `None` when it has too few points for cue 1.
     pub fn new(foreground: Foreground, camera: Intrinsics) -> Option<Self> {
         let distance = DistanceCue::new(&foreground.points)?;
-        Some(Self { foreground, camera, distance })
+        Some(Self { foreground, camera, distance, colour: None })
+    }
+
+    /// The same with what the cameras at the sides see.
+    #[must_use]
+    pub fn with_colour(self, colour: Option<ColourCue>) -> Self {
+        Self { colour, ..self }
     }
 
     /// The foreground.
@@ -74,7 +83,8 @@ pub struct Fit {
 #[derive(Debug, Clone)]
 pub struct LegParticleModel {
     floor: Floor,
-    cues: Cues,
+    /// What weighs particles.
+    pub cues: LegCues,
     sd: [f64; LEG_DIMENSION],
     bounds: [[f32; 2]; LEG_DIMENSION],
     drawn: Vec<f32>,
@@ -106,7 +116,7 @@ impl Default for Body {
 
 impl LegParticleModel {
     /// The model over a floor.
-    pub fn new(floor: Floor, cues: Cues, noise: &TransitionNoise) -> Self {
+    pub fn new(floor: Floor, cues: LegCues, noise: &TransitionNoise) -> Self {
         Self {
             floor,
             cues,
@@ -196,8 +206,10 @@ impl ParticleModel for LegParticleModel {
         let (cues, power, arch) = (self.cues, self.likelihood_power, self.arch);
         let width = observation.foreground.width;
         log_likelihood.par_chunks_mut(CHUNK).zip(self.bodies.par_chunks(CHUNK)).for_each_init(
-            || Scratch::new(width),
-            |scratch, (out, bodies)| arch.dispatch(WeighTask { observation, cues, power, bodies, scratch, out }),
+            || (Scratch::new(width), ColourScratch::default()),
+            |(scratch, colours), (out, bodies)| {
+                arch.dispatch(WeighTask { observation, cues, power, bodies, scratch, colours, out });
+            },
         );
     }
 }
@@ -205,10 +217,11 @@ impl ParticleModel for LegParticleModel {
 /// Log-likelihoods of some particles, for any instruction set.
 struct WeighTask<'a> {
     observation: &'a Observation,
-    cues: Cues,
+    cues: LegCues,
     power: f64,
     bodies: &'a [Body],
     scratch: &'a mut Scratch,
+    colours: &'a mut ColourScratch,
     out: &'a mut [f32],
 }
 
@@ -232,6 +245,12 @@ impl WithSimd for WeighTask<'_> {
             if self.cues.has_projection() {
                 let Some(distance) = projection.distance(simd, &body.solids, self.scratch) else { continue };
                 log -= projection_cue::LAMBDA_PER_M * distance;
+            }
+            if self.cues.has_colour()
+                && let Some(colour) = &self.observation.colour
+            {
+                let Some(distance) = colour.distance(simd, &body.solids, self.colours) else { continue };
+                log -= colour_cue::LAMBDA * distance;
             }
             if log.is_finite() {
                 self.out[i] = (self.power * log) as f32;
@@ -270,7 +289,7 @@ mod tests {
         let mut start = state.to_vector().as_slice().to_vec();
         start.resize(PARTICLE_DIMENSION, 0.0);
         let mut particles = Particles::at(&start, count);
-        let mut model = LegParticleModel::new(floor(), Cues::Both, &TransitionNoise::default());
+        let mut model = LegParticleModel::new(floor(), LegCues::Both, &TransitionNoise::default());
         model.propagate(1.0 / NOMINAL_RATE, &mut RandomStreams::new(1), &mut particles);
         (model, particles)
     }
@@ -309,7 +328,7 @@ mod tests {
         let observation = Observation::new(foreground(&image(&solids)), CAMERA).expect("legs in view");
         let (mut model, particles) = particles_around(&state, 4 * LANES);
         let mut logs = vec![0.0; 4 * LANES];
-        for cues in Cues::ALL {
+        for cues in [LegCues::Distance, LegCues::Projection, LegCues::Both] {
             model.cues = cues;
             model.log_likelihood(&observation, &particles, &mut logs);
             let fit = model.fit(&observation, &state);

@@ -2,13 +2,13 @@
 
 use super::foreground::Foreground;
 use super::render::render;
-use super::settings::Region;
 use crate::body::legs::constraints::stand;
 use crate::body::legs::solids::SOLID_COUNT;
 use crate::body::legs::{LegPose, LegState, LegVector, bounds};
 use crate::geometry::camera::{DepthMap, Intrinsics};
 use crate::geometry::floor::Floor;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
+use crate::pipeline::leg_pose::foreground::Region;
 use nalgebra::Vector3;
 
 /// Quarter resolution keeps the plain sums quick.

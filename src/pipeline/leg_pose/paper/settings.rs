@@ -1,58 +1,11 @@
 //! What can be set of the paper's tracker.
 
+use crate::assessment::LegCues;
 use crate::body::legs::{FIRST_ANGLE, LEG_DIMENSION};
+use crate::pipeline::leg_pose::foreground::Region;
 
-/// Which cues weigh the particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Cues {
-    /// Cue 1: distances between model and foreground points in space.
-    Distance,
-    /// Cue 2: depths of the model's projection against the image.
-    Projection,
-    /// The product of both.
-    #[default]
-    Both,
-}
-
-impl Cues {
-    /// Every choice, in the order of the paper's tables.
-    pub const ALL: [Cues; 3] = [Cues::Distance, Cues::Projection, Cues::Both];
-
-    /// Name in settings and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Cues::Distance => "cue1",
-            Cues::Projection => "cue2",
-            Cues::Both => "both",
-        }
-    }
-
-    /// True when cue 1 counts.
-    pub fn has_distance(self) -> bool {
-        self != Cues::Projection
-    }
-
-    /// True when cue 2 counts.
-    pub fn has_projection(self) -> bool {
-        self != Cues::Distance
-    }
-}
-
-/// The part of space in which legs are looked for, in `sensor`, metres; y is free.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Region {
-    /// Nearest and farthest z.
-    pub depth: [f64; 2],
-    /// Leftmost and rightmost x in the image.
-    pub x: [f64; 2],
-}
-
-impl Default for Region {
-    /// The box of \[walker\], section 4.2: it belongs to the authors' walker.
-    fn default() -> Self {
-        Self { depth: [0.0, 1.5], x: [-0.245, 0.175] }
-    }
-}
+/// The box of \[walker\], section 4.2: it belongs to the authors' walker.
+pub const PAPER_REGION: Region = Region { depth: [0.0, 1.5], x: [-0.245, 0.175] };
 
 /// Standard deviations of the transition's noise, manually set as in \[walker\]; radians, metres and factors per 1/30 s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,7 +71,7 @@ pub struct PaperSettings {
     /// Particles; rounded up to whole registers ([`LANES`](crate::geometry::lanes::LANES)).
     pub particles: usize,
     /// Cues that weigh them.
-    pub cues: Cues,
+    pub cues: LegCues,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Where legs are looked for.
@@ -133,9 +86,9 @@ impl Default for PaperSettings {
     fn default() -> Self {
         Self {
             particles: 5000,
-            cues: Cues::Both,
+            cues: LegCues::Both,
             seed: 1,
-            region: Region::default(),
+            region: PAPER_REGION,
             threshold_steps: 4.0,
             noise: TransitionNoise::default(),
         }

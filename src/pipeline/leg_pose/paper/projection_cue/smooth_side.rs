@@ -18,8 +18,9 @@ const OUTER: f32 = 0.951_056_5;
 const INNER: f32 = 0.587_785_25;
 /// Places and what lies between them, where the polynomial differs most.
 const CHECKED: [f32; 3] = [-1.0, 0.809_017, 1.0];
-/// Largest difference there, metres: a fiftieth of a raw step at 0.9 m.
-const TOLERANCE: f32 = 5e-5;
+/// Largest difference there, metres: a tenth of a raw step at 0.9 m. It is met at the edges of few columns; with a fifth of it
+/// the sums of 4096 particles were the same to 2 · 10⁻⁶, and a tenth slower.
+const TOLERANCE: f32 = 2.5e-4;
 
 /// The polynomials of one solid.
 #[derive(Debug, Clone)]

@@ -3,17 +3,24 @@
 //! A track starts by itself: the first state ([`first_state`]) is spread wide and the filter is run several times
 //! on the same image, with noise that falls and a likelihood that rises to its full power. A track whose model stays far
 //! from the image is given up and started anew.
+//!
+//! With the colour cue the first pose of a track is that of both depth cues, where the paper's first image is labelled by
+//! hand; from then on depth says nothing, and so the track is not given up either.
 
+use super::colour_cue::{ColourCue, Templates};
 use super::foreground::Foreground;
 use super::model::{Fit, LegParticleModel, Observation, PARTICLE_DIMENSION};
 use super::settings::PaperSettings;
 use super::start::first_state;
+use super::visibility::Visibility;
+use crate::assessment::LegCues;
 use crate::body::legs::constraints::stand;
 use crate::body::legs::{LEG_DIMENSION, LegPose, LegState, LegVector, forward_kinematics};
 use crate::estimation::particle_filter::ParticleFilter;
 use crate::geometry::camera::{DepthMap, Intrinsics};
 use crate::geometry::floor::Floor;
 use crate::geometry::lanes::LANES;
+use crate::recording::side_camera::{SideCamera, SideImages};
 use nalgebra::{SMatrix, Vector3};
 
 /// Nominal interval between frames, seconds.
@@ -56,6 +63,8 @@ pub struct LegEstimate {
     pub effective_sample_size: f64,
     /// How well the estimate fits the image.
     pub fit: Fit,
+    /// What the image shows of it.
+    pub visibility: Visibility,
     /// Pixels of the foreground.
     pub foreground_pixels: usize,
     /// Share of the image that saw nothing, 0 to 1.
@@ -98,6 +107,9 @@ pub struct Tracker {
     background: DepthMap,
     model: LegParticleModel,
     track: Option<Track>,
+    templates: Option<Templates>,
+    /// What the cameras at the sides see at the time of the next image.
+    colour: Option<ColourCue>,
     last_time_ns: Option<i64>,
     /// Tracks so far: each has its own random numbers.
     starts: u64,
@@ -108,7 +120,26 @@ impl Tracker {
     /// none.
     pub fn new(settings: PaperSettings, camera: Intrinsics, floor: Floor, background: DepthMap) -> Self {
         let model = LegParticleModel::new(floor, settings.cues, &settings.noise);
-        Self { settings, camera, floor, background, model, track: None, last_time_ns: None, starts: 0 }
+        Self {
+            settings,
+            camera,
+            floor,
+            background,
+            model,
+            track: None,
+            templates: None,
+            colour: None,
+            last_time_ns: None,
+            starts: 0,
+        }
+    }
+
+    /// Takes what the cameras at the sides see at the time of the next image; `cameras` describes them in the first one.
+    pub fn see_sides(&mut self, cameras: &[SideCamera; 2], images: &SideImages) {
+        if self.templates.is_none() {
+            self.templates = Templates::new(cameras, images);
+        }
+        self.colour = self.templates.as_ref().map(|templates| templates.cue(images));
     }
 
     /// The foreground of an image, as the tracker sees it.
@@ -139,6 +170,7 @@ impl Tracker {
             return Err(NoEstimate::NoForeground);
         }
         let observation = Observation::new(foreground, self.camera).ok_or(NoEstimate::NoForeground)?;
+        let observation = observation.with_colour(self.colour.take());
         if let Some(track) = self.track.take()
             && let Some(estimate) = self.follow(track, time_ns, &observation)
         {
@@ -157,7 +189,7 @@ impl Tracker {
         track.time_ns = time_ns;
         let estimate = self.estimate(&track, observation, false);
         let distance = estimate.fit.distances.mean();
-        let is_far = distance.is_nan() || distance >= LOST_DISTANCE;
+        let is_far = !self.settings.cues.has_colour() && (distance.is_nan() || distance >= LOST_DISTANCE);
         track.frames_lost = if is_far { track.frames_lost + 1 } else { 0 };
         if track.frames_lost >= LOST_FRAMES {
             return None;
@@ -176,11 +208,15 @@ impl Tracker {
         self.starts += 1;
         let mut filter = ParticleFilter::new(&coordinates, count, seed);
         self.model.moves = false;
+        if self.settings.cues.has_colour() {
+            self.model.cues = LegCues::Both;
+        }
         for (noise, power) in SEARCH {
             self.model.noise_factor = noise;
             self.model.likelihood_power = power;
             filter.step(&mut self.model, INTERVAL_S, Some(observation));
         }
+        self.model.cues = self.settings.cues;
         self.model.moves = true;
         self.model.noise_factor = 1.0;
         self.model.likelihood_power = 1.0;
@@ -193,7 +229,7 @@ impl Tracker {
     fn estimate(&self, track: &Track, observation: &Observation, started: bool) -> LegEstimate {
         let moments = track.filter.moments();
         let mean = LegVector::from_fn(|i, _| moments.mean[i]);
-        let (state, legs, _) = stand(&LegState::from_vector(&mean), &self.floor);
+        let (state, legs, solids) = stand(&LegState::from_vector(&mean), &self.floor);
         let covariance: SMatrix<f64, LEG_DIMENSION, LEG_DIMENSION> =
             moments.covariance.fixed_view::<LEG_DIMENSION, LEG_DIMENSION>(0, 0).into_owned();
         LegEstimate {
@@ -203,6 +239,7 @@ impl Tracker {
             state,
             effective_sample_size: moments.effective_sample_size,
             fit: self.model.fit(observation, &state),
+            visibility: Visibility::new(observation.foreground(), &solids, &self.camera),
             foreground_pixels: observation.foreground().pixels,
             missing: observation.foreground().missing,
             started,

@@ -1,8 +1,8 @@
 use super::super::scene::{CAMERA, HEIGHT, REGION, WIDTH, floor, image, walking};
-use super::super::settings::Cues;
 use super::*;
+use crate::assessment::LegCues;
 
-fn tracker(cues: Cues, particles: usize) -> Tracker {
+fn tracker(cues: LegCues, particles: usize) -> Tracker {
     let settings = PaperSettings { particles, cues, region: REGION, ..PaperSettings::default() };
     Tracker::new(settings, CAMERA, floor(), DepthMap::empty(WIDTH, HEIGHT))
 }
@@ -32,13 +32,13 @@ fn ankle_errors(tracker: &mut Tracker, frames: u32) -> (f64, f64) {
 #[test]
 fn a_walker_of_cylinders_is_followed_from_the_first_frame() {
     // With 5000 particles the mean is 2 cm; fewer wander more.
-    let (mean, worst) = ankle_errors(&mut tracker(Cues::Both, 2000), 15);
+    let (mean, worst) = ankle_errors(&mut tracker(LegCues::Both, 2000), 15);
     assert!(mean < 0.045 && worst < 0.11, "ankles are off by {mean} on average, {worst} at most");
 }
 
 #[test]
 fn each_cue_alone_follows_too() {
-    for cues in [Cues::Distance, Cues::Projection] {
+    for cues in [LegCues::Distance, LegCues::Projection] {
         let (mean, _) = ankle_errors(&mut tracker(cues, 1000), 10);
         assert!(mean < 0.10, "{cues:?}: ankles are off by {mean}");
     }
@@ -49,7 +49,7 @@ fn one_and_three_threads_give_the_same_bytes() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
-            let mut tracker = tracker(Cues::Both, 200);
+            let mut tracker = tracker(LegCues::Both, 200);
             (0..4).map(|frame| tracker.step(moment(frame).0, &image(&walking(moment(frame).1).2))).collect::<Vec<_>>()
         })
     };
@@ -58,7 +58,7 @@ fn one_and_three_threads_give_the_same_bytes() {
 
 #[test]
 fn a_track_is_found_again_after_the_camera_was_covered() {
-    let mut tracker = tracker(Cues::Both, 500);
+    let mut tracker = tracker(LegCues::Both, 500);
     let nothing = DepthMap::empty(WIDTH, HEIGHT);
     let mut found = Vec::new();
     for frame in 0..40 {
@@ -75,7 +75,7 @@ fn a_track_is_found_again_after_the_camera_was_covered() {
 
 #[test]
 fn hostile_frames_give_reasons_not_panics() {
-    let mut tracker = tracker(Cues::Both, 64);
+    let mut tracker = tracker(LegCues::Both, 64);
     let (_, _, solids) = walking(0.0);
     let good = image(&solids);
     let filled =
