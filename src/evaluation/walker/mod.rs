@@ -1,5 +1,8 @@
 //! Tracked legs beside the truth of simulated walks, and beside the baseline.
 
+pub mod scores;
+pub mod sequences;
+
 use crate::assessment::LegPoseSettings;
 use crate::body::Side;
 use crate::geometry::camera::Intrinsics;
@@ -120,7 +123,7 @@ fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
 /// The images of a simulated walk, rendered as they are asked for.
 struct SimulatedFrames<'a> {
     frames: Box<dyn Iterator<Item = WalkerFrame> + 'a>,
-    background: DepthImage,
+    background: Option<DepthImage>,
     camera: Intrinsics,
 }
 
@@ -128,7 +131,7 @@ impl<'a> SimulatedFrames<'a> {
     fn new(simulation: &'a WalkerSimulation) -> Self {
         Self {
             frames: Box::new(simulation.frames()),
-            background: simulation.background(),
+            background: Some(simulation.background()),
             camera: *simulation.intrinsics(),
         }
     }
@@ -147,6 +150,6 @@ impl DepthFrames for SimulatedFrames<'_> {
     }
 
     fn background(&self) -> Option<&DepthImage> {
-        Some(&self.background)
+        self.background.as_ref()
     }
 }
