@@ -1,8 +1,11 @@
 //! `surefoot evaluate walker`: tracked legs beside the truth of simulated walks.
 
+use super::walker_sweep;
 use crate::assessment::LegPoseSettings;
+use crate::evaluation::walker::sequences::Condition;
 use crate::evaluation::walker::{MethodErrors, evaluate};
 use crate::synthetic::walker::cesium::body_from_glb;
+use crate::synthetic::walker::trousers::trousers;
 use crate::synthetic::walker::{Course, WalkerSettings, WalkerSimulation};
 use anyhow::Context;
 use std::fs;
@@ -16,7 +19,8 @@ use std::path::PathBuf;
 /// has no model and no filter: the foreground is split into two legs, and the lowest part of each is the foot.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  surefoot evaluate walker\n  surefoot evaluate walker --seeds 3 --missing 0.3 --json"
+    after_help = "Examples:\n  surefoot evaluate walker\n  surefoot evaluate walker --seeds 3 --missing 0.3 --json\n  \
+    surefoot evaluate walker --conditions all --seeds 2\n  surefoot evaluate walker --conditions turn,narrow --first-seed 9 --seeds 1"
 )]
 pub(super) struct WalkerArgs {
     /// The figure that walks [default: depth/assets/CesiumMan.glb below $SUREFOOT_DATA, else ../shared/data]
@@ -25,6 +29,13 @@ pub(super) struct WalkerArgs {
     /// Sequences
     #[arg(long, default_value_t = 6, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
+    /// The first of the seeds
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    first_seed: u64,
+    /// Judge the default tracker on walks that are hard in one way each, by both figures, steps and intervals included:
+    /// names separated by commas, or `all`; the other options but --figure, --seeds and --json do not apply
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = conditions)]
+    conditions: Vec<Vec<Condition>>,
     /// Share of the legs' pixels that are missing, 0 to 0.9
     #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
     missing: f64,
@@ -47,8 +58,14 @@ pub(super) fn run(args: &WalkerArgs, out: &mut dyn Write) -> anyhow::Result<()> 
     let path = args.figure.clone().unwrap_or_else(usual);
     let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let body = body_from_glb(&bytes)?;
+    let seeds = args.first_seed..args.first_seed + args.seeds;
+    if !args.conditions.is_empty() {
+        let figures = [("trousers", trousers()), ("cesium", body)];
+        let seeds: Vec<u64> = seeds.collect();
+        return walker_sweep::run(&args.conditions.concat(), &seeds, &figures, args.json, out);
+    }
     let mut sequences = Vec::new();
-    for seed in 1..=args.seeds {
+    for seed in seeds {
         let mut settings = WalkerSettings::of_seed(Course::Straight, seed);
         if let Some(tilt) = args.tilt {
             settings = settings.with_tilt(tilt.to_radians());
@@ -88,6 +105,18 @@ pub(super) fn run(args: &WalkerArgs, out: &mut dyn Write) -> anyhow::Result<()> 
         "\nMean absolute error (standard deviation) with both feet on the floor; all frames: length / width."
     )?;
     Ok(())
+}
+
+/// The condition of a name; all of them for `all`.
+fn conditions(name: &str) -> Result<Vec<Condition>, String> {
+    if name == "all" {
+        return Ok(Condition::ALL.to_vec());
+    }
+    let found = Condition::ALL.into_iter().find(|condition| condition.name() == name);
+    found.map(|condition| vec![condition]).ok_or_else(|| {
+        let names = Condition::ALL.map(Condition::name).join(", ");
+        format!("there is no condition `{name}`; there are all, {names}")
+    })
 }
 
 fn write_row(seed: u64, errors: &MethodErrors, out: &mut dyn Write) -> std::io::Result<()> {

@@ -9,8 +9,9 @@ use crate::pipeline::leg_pose::foreground::Foreground;
 use crate::pipeline::leg_pose::two_legs::TwoLegs;
 use crate::pipeline::leg_pose::{DepthFrames, assess_watched};
 use crate::progress::Monitor;
+use crate::synthetic::walker::course::Footprint;
 use crate::synthetic::walker::{StepTruth, WalkerSimulation};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// A contact and a step within this time of each other are the same, seconds.
 const SAME_STEP_S: f64 = 0.25;
@@ -153,7 +154,7 @@ fn value(found: &Assessment, channel: &str, k: usize) -> Option<[f64; 3]> {
 fn score_distances(
     simulation: &WalkerSimulation,
     found: &Assessment,
-    feet: &[Option<[nalgebra::Vector3<f64>; 2]>],
+    feet: &[Option<[Vector3<f64>; 2]>],
     score: &mut SequenceScore,
 ) {
     let (mut baseline, mut tracked) = (Distances::default(), Distances::default());
@@ -224,7 +225,7 @@ fn score_steps(simulation: &WalkerSimulation, found: &Assessment, score: &mut Se
     let truth = simulation.steps();
     score.n_true_steps = contacts.len();
     let (mut strikes, mut offs) = (Vec::new(), Vec::new());
-    let mut pairs: Vec<(&Step, &StepTruth)> = Vec::new();
+    let mut pairs: Vec<(&Step, [f64; 2], Option<[f64; 2]>)> = Vec::new();
     for step in &gait.steps {
         let Some(contact) = nearest(&contacts, step.side, step.heel_strike_s) else {
             score.n_false += 1;
@@ -235,9 +236,12 @@ fn score_steps(simulation: &WalkerSimulation, found: &Assessment, score: &mut Se
         offs.extend(nearest(&releases, step.side, step.toe_off_s).map(|release| step.toe_off_s - release));
         let is_used = step.excluded_because.is_empty();
         score.n_used[0] += usize::from(is_used);
-        let Some(truth) = truth.iter().find(|t| t.side == step.side as usize && t.contact_s == contact) else { continue };
+        let Some(truth) = truth.iter().find(|t| t.side == step.side as usize && t.contact_s == contact) else {
+            continue;
+        };
         if is_used {
-            pairs.push((step, truth));
+            let prints = prints_apart(simulation.footprints(), truth);
+            pairs.push((step, [truth.ankle_length_m, truth.ankle_width_m], prints));
             score.n_wrongly_used += usize::from(!should_count(truth));
         }
     }
@@ -245,8 +249,8 @@ fn score_steps(simulation: &WalkerSimulation, found: &Assessment, score: &mut Se
     score.heel_strike_s = mean_and_deviation(&strikes);
     score.toe_off_s = mean_and_deviation(&offs);
     score.steps = [
-        step_errors(&pairs, ANKLES_AT_MID_DOUBLE_SUPPORT, |t| [t.ankle_length_m, t.ankle_width_m]),
-        step_errors(&pairs, FLAT_FOOTPRINTS, |t| [t.footprint_length_m, t.footprint_width_m]),
+        step_errors(pairs.iter().map(|(step, ankles, _)| (*step, *ankles)), ANKLES_AT_MID_DOUBLE_SUPPORT),
+        step_errors(pairs.iter().filter_map(|(step, _, prints)| Some((*step, (*prints)?))), FLAT_FOOTPRINTS),
     ];
 }
 
@@ -255,16 +259,22 @@ fn should_count(step: &StepTruth) -> bool {
     step.place_in_bout >= 2 && step.steps_to_come >= 2 && !step.is_turning
 }
 
-fn step_errors(
-    pairs: &[(&Step, &StepTruth)],
-    definition: &str,
-    true_values: fn(&StepTruth) -> [f64; 2],
-) -> StepErrors {
+/// Length and width of a step by its footprints, along the line of the other foot's prints before and after it.
+fn prints_apart(prints: &[Footprint], step: &StepTruth) -> Option<[f64; 2]> {
+    let other = |print: &&Footprint| print.side != step.side;
+    let before = prints.iter().filter(other).rfind(|print| print.contact_s < step.contact_s)?;
+    let after = prints.iter().filter(other).find(|print| print.contact_s > step.contact_s)?;
+    let along = (after.place - before.place).try_normalize(0.02)?;
+    let apart = step.footprint.place - before.place;
+    let left = Vector3::y().cross(&along);
+    Some([apart.dot(&along), apart.dot(&left) * if step.side == 0 { 1.0 } else { -1.0 }])
+}
+
+fn step_errors<'a>(pairs: impl Iterator<Item = (&'a Step, [f64; 2])>, definition: &str) -> StepErrors {
     let mut errors = Distances::default();
     let mut n_held = [0; 2];
     for (step, truth) in pairs {
         let Some(measure) = step.measures.iter().find(|m: &&StepMeasure| m.definition == definition) else { continue };
-        let truth = true_values(truth);
         errors.add(truth, [measure.length_m, measure.width_m]);
         for (k, [low, high]) in [measure.length_interval_m, measure.width_interval_m].into_iter().enumerate() {
             n_held[k] += usize::from((low..=high).contains(&truth[k]));

@@ -179,8 +179,7 @@ impl Preparation {
             }
         }
         result.missing = 1.0 - f64::from(seen) / f64::from(looked_at.max(1));
-        result.blocked =
-            result.missing > BLIND_SHARE || f64::from(near) > BLOCKED_SHARE * f64::from(looked_at.max(1));
+        result.blocked = result.missing > BLIND_SHARE || f64::from(near) > BLOCKED_SHARE * f64::from(looked_at.max(1));
         if result.blocked {
             result.points.clear();
         }

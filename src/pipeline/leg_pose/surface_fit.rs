@@ -38,6 +38,10 @@ const OPEN_ABOVE_HIP: f64 = 0.3;
 /// The middle of a shoe's rear lies this much below the ankle, metres; were a foot's axis to begin at the ankle, the low
 /// upper of the shoe would pull the ankle down.
 const FOOT_DROP: f64 = 0.05;
+/// Least height of the ankle's centre above the floor, metres: 0.039 of stature (Winter) and a shoe's sole.
+const ANKLE_HEIGHT: f64 = 0.09;
+/// Points higher than this below upright hips are trunk, arms and what hangs from them, metres.
+const BELOW_HIPS: f64 = 0.05;
 /// A foot is wider than high: half the width of its flat part at ankle and toes, metres.
 const FLAT_HALF_WIDTH: [f64; 2] = [0.005, 0.018];
 /// Number of segments of both legs.
@@ -141,7 +145,8 @@ pub fn linearise(
     let mut weights = [0.0; SEGMENTS];
     let mut support = [0.0; SEGMENTS];
     let (mut explained, mut misfit, mut total) = (0.0, 0.0, 0.0);
-    for point in points {
+    let top = ANKLE_HEIGHT + shape[0] + shape[1] - BELOW_HIPS;
+    for point in points.iter().filter(|point| point.position.y < top) {
         total += point.pixels;
         let Some(touch) = touch(&cones, &point.position) else {
             misfit += point.pixels;
@@ -158,7 +163,16 @@ pub fn linearise(
         let weight = robust * point.pixels;
         let n = &touch.normal;
         let (u, t) = (1.0 - touch.t, touch.t);
-        let row = SVector::<f64, 8>::from([-u * n.x, -u * n.y, -u * n.z, -t * n.x, -t * n.y, -t * n.z, -u.clamp(0.0, 1.0), -t.clamp(0.0, 1.0)]);
+        let row = SVector::<f64, 8>::from([
+            -u * n.x,
+            -u * n.y,
+            -u * n.z,
+            -t * n.x,
+            -t * n.y,
+            -t * n.z,
+            -u.clamp(0.0, 1.0),
+            -t.clamp(0.0, 1.0),
+        ]);
         blocks[touch.segment].syger(weight, &row, &row, 1.0);
         vectors[touch.segment].axpy(weight * touch.residual, &row, 1.0);
         weights[touch.segment] += weight;
@@ -262,8 +276,6 @@ impl NormalEquations {
         const FORWARD_SD: f64 = 0.05;
         const SIDEWAYS_SD: f64 = 0.06;
         const FLOOR_SD: f64 = 0.002;
-        /// Least height of the ankle's centre above the floor, metres: 0.039 of stature (Winter) and a shoe's sole.
-        const ANKLE_HEIGHT: f64 = 0.09;
         let [ankle, toe] = [LegPoint::Ankle, LegPoint::Toe].map(|p| 3 * p.index(side));
         let length = shape[2];
         self.add(pose[toe + 2] - pose[ankle + 2] - 0.9 * length, FORWARD_SD, &[(toe + 2, 1.0), (ankle + 2, -1.0)]);

@@ -238,7 +238,8 @@ fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
         })
         .collect();
     let step_share = |n: usize| {
-        let step = (frames[walk[n].heel_strike].time - n.checked_sub(1).map_or(f64::NAN, |m| frames[walk[m].heel_strike].time))
+        let step = (frames[walk[n].heel_strike].time
+            - n.checked_sub(1).map_or(f64::NAN, |m| frames[walk[m].heel_strike].time))
             / (frames[walk[n].heel_strike].time - frames[walk[n].toe_off].time);
         if step.is_finite() { step.clamp(1.0, 2.0) } else { 1.5 }
     };
