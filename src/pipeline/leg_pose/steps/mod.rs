@@ -32,7 +32,7 @@ const NORMAL_975: f64 = 1.96;
 /// deviation along and across by the definitions of a step, metres; from simulated walks.
 const ANKLE_BODY_SD: [f64; 2] = [0.007, 0.004];
 /// See [`ANKLE_BODY_SD`].
-const PRINT_BODY_SD: [f64; 2] = [0.006, 0.007];
+const PRINT_BODY_SD: [f64; 2] = [0.012, 0.007];
 
 /// A swing, as frame numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
