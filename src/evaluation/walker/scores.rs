@@ -219,13 +219,20 @@ fn nearest(events: &[(usize, f64)], side: Side, time: f64) -> Option<f64> {
     own.min_by(|a, b| (a - time).abs().total_cmp(&(b - time).abs())).filter(|at| (at - time).abs() < SAME_STEP_S)
 }
 
+/// A step that was found and its true length and width by both definitions, metres.
+struct Pair<'a> {
+    step: &'a Step,
+    ankles: [f64; 2],
+    prints: Option<[f64; 2]>,
+}
+
 fn score_steps(simulation: &WalkerSimulation, found: &Assessment, score: &mut SequenceScore) {
     let Some(gait) = &found.gait else { return };
     let [contacts, releases] = true_events(simulation);
     let truth = simulation.steps();
     score.n_true_steps = contacts.len();
     let (mut strikes, mut offs) = (Vec::new(), Vec::new());
-    let mut pairs: Vec<(&Step, [f64; 2], Option<[f64; 2]>)> = Vec::new();
+    let mut pairs: Vec<Pair<'_>> = Vec::new();
     for step in &gait.steps {
         let Some(contact) = nearest(&contacts, step.side, step.heel_strike_s) else {
             score.n_false += 1;
@@ -241,7 +248,7 @@ fn score_steps(simulation: &WalkerSimulation, found: &Assessment, score: &mut Se
         };
         if is_used {
             let prints = prints_apart(simulation.footprints(), truth);
-            pairs.push((step, [truth.ankle_length_m, truth.ankle_width_m], prints));
+            pairs.push(Pair { step, ankles: [truth.ankle_length_m, truth.ankle_width_m], prints });
             score.n_wrongly_used += usize::from(!should_count(truth));
         }
     }
@@ -249,8 +256,8 @@ fn score_steps(simulation: &WalkerSimulation, found: &Assessment, score: &mut Se
     score.heel_strike_s = mean_and_deviation(&strikes);
     score.toe_off_s = mean_and_deviation(&offs);
     score.steps = [
-        step_errors(pairs.iter().map(|(step, ankles, _)| (*step, *ankles)), ANKLES_AT_MID_DOUBLE_SUPPORT),
-        step_errors(pairs.iter().filter_map(|(step, _, prints)| Some((*step, (*prints)?))), FLAT_FOOTPRINTS),
+        step_errors(pairs.iter().map(|pair| (pair.step, pair.ankles)), ANKLES_AT_MID_DOUBLE_SUPPORT),
+        step_errors(pairs.iter().filter_map(|pair| Some((pair.step, pair.prints?))), FLAT_FOOTPRINTS),
     ];
 }
 
