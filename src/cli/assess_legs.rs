@@ -24,7 +24,7 @@ pub(super) fn assess(
 ) -> anyhow::Result<Option<(Assessment, Track)>> {
     let open = || File::open(path).with_context(|| format!("cannot read {}", path.display()));
     let Ok(reader) = DepthReader::open(BufReader::new(open()?), &Limits::default()) else { return Ok(None) };
-    let assessed = leg_pose::assess_with_track(reader, &settings()?, &Monitor::default());
+    let assessed = leg_pose::assess_watched(reader, &settings()?, &mut |_, _| {}, &Monitor::default());
     let (mut assessment, track) = assessed.map_err(|error| anyhow!("{error}"))?;
     let mut digest = Sha256::new();
     let mut file = open()?;

@@ -55,9 +55,9 @@ pub(super) static STEP_WIDTH_CV: Rule = Rule {
             error_sd: sd.error_sd.map(in_percent),
         };
         let [low, high] = BRACH_EXTREME_PCT;
-        let true_sd = match without_error(info, &percent, high) {
+        let true_sd = match without_error(&percent, high) {
             Ok(found) => found,
-            Err(refused) => return refused,
+            Err(reason) => return refused(info, &percent, reason),
         };
         let nearer_low = true_sd.value < 0.5 * (low + high);
         Finding::against(info, &true_sd, info.cutoffs[usize::from(!nearer_low)])
@@ -83,9 +83,9 @@ pub(super) static STEP_WIDTH_SD: Rule = Rule {
             return Finding::unknown(info, "how much step width varies");
         };
         let [usual, excessive] = SKIADOPOULOS_M;
-        let true_sd = match without_error(info, sd, excessive) {
+        let true_sd = match without_error(sd, excessive) {
             Ok(found) => found,
-            Err(refused) => return refused,
+            Err(reason) => return refused(info, sd, reason),
         };
         let category = match true_sd.value {
             sd if sd < usual => "usual",
@@ -116,18 +116,21 @@ pub(super) static STRIDE_TIME_SD: Rule = Rule {
 };
 
 /// The standard deviation without what measurement adds, or why there is none; `limit` is the rule's, in the same unit.
-fn without_error(info: &RuleInfo, observed: &Measured, limit: f64) -> Result<Measured, Finding> {
-    let refuse = |reason: String| Finding::new(info, Some(Status::NotAssessable), reason).with_value(observed);
+fn without_error(observed: &Measured, limit: f64) -> Result<Measured, String> {
     let n = observed.n_observations.unwrap_or(0);
     if n < FEWEST_STEPS {
-        return Err(refuse(format!("{n} steps are too few: a variability needs at least {FEWEST_STEPS}")));
+        return Err(format!("{n} steps are too few: a variability needs at least {FEWEST_STEPS}"));
     }
     let Some(error_sd) = observed.error_sd else {
-        return Err(refuse("how much the measurement itself varies is not known, and adds to what is seen".to_owned()));
+        return Err("how much the measurement itself varies is not known, and adds to what is seen".to_owned());
     };
     if error_sd > LARGEST_ERROR * limit {
-        return Err(refuse("the measurement itself varies by more than half of the limit".to_owned()));
+        return Err("the measurement itself varies by more than half of the limit".to_owned());
     }
     let value = (observed.value.powi(2) - error_sd.powi(2)).max(0.0).sqrt();
     Ok(Measured { value, ..*observed })
+}
+
+fn refused(info: &RuleInfo, observed: &Measured, reason: String) -> Finding {
+    Finding::new(info, Some(Status::NotAssessable), reason).with_value(observed)
 }

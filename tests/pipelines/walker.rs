@@ -11,9 +11,10 @@ use surefoot::pipeline::PipelineError;
 use surefoot::pipeline::leg_pose::floor::Floor;
 use surefoot::pipeline::leg_pose::foreground::{Preparation, Region};
 use surefoot::pipeline::leg_pose::two_legs::TwoLegs;
-use surefoot::pipeline::leg_pose::{DepthFrames, assess};
+use surefoot::pipeline::leg_pose::{DeclaredMount, DepthFrames, assess};
 use surefoot::progress::Monitor;
-use surefoot::recording::depth::{DepthImage, DepthReader, MISSING_RAW};
+use surefoot::recording::depth::{DepthImage, DepthReader, DepthUnit, MISSING_RAW};
+use surefoot::recording::import::{CameraFile, import_depth};
 use surefoot::recording::side_camera::{SideCamera, SideImages};
 use surefoot::recording::{DecodeError, Limits};
 use surefoot::synthetic::walker::trousers::trousers;
@@ -40,6 +41,8 @@ fn read(bytes: &[u8]) -> DepthReader<&[u8]> {
 struct Changed<F> {
     reader: DepthReader<&'static [u8]>,
     background: Option<DepthImage>,
+    camera: Intrinsics,
+    mount: DeclaredMount,
     left: usize,
     change: F,
 }
@@ -48,7 +51,8 @@ impl<F: FnMut(&mut DepthImage)> Changed<F> {
     fn new(n_frames: usize, change: F) -> Self {
         let reader = read(&WALK_BYTES);
         let background = DepthReader::background(&reader).cloned();
-        Self { reader, background, left: n_frames, change }
+        let (camera, mount) = (*WALK.intrinsics(), DeclaredMount::default());
+        Self { reader, background, camera, mount, left: n_frames, change }
     }
 }
 
@@ -64,11 +68,15 @@ impl<F: FnMut(&mut DepthImage)> DepthFrames for Changed<F> {
     }
 
     fn intrinsics(&self) -> Option<Intrinsics> {
-        Some(*WALK.intrinsics())
+        Some(self.camera)
     }
 
     fn background(&self) -> Option<&DepthImage> {
         self.background.as_ref()
+    }
+
+    fn declared_mount(&self) -> DeclaredMount {
+        self.mount
     }
 }
 
@@ -253,12 +261,128 @@ fn images_without_legs_are_refused() {
 }
 
 #[test]
-fn a_thing_right_before_the_camera_takes_no_steps() {
+fn a_thing_that_fills_the_image_has_no_legs() {
     // 0.4 m away, over the whole image.
-    let found = assessed(Changed::new(25, |image| image.values.fill(300)));
-    let Ok(found) = found else { return assert!(matches!(found, Err(PipelineError::Unsuitable { .. }))) };
-    assert!(found.gait.as_ref().unwrap().steps.is_empty(), "{:?}", found.gait);
-    assert!(codes(&found).is_superset(&BTreeSet::from(["background_mismatch", "no_steps"])), "{:?}", codes(&found));
+    assert_eq!(refusal(Changed::new(25, |image| image.values.fill(300))), "no_legs");
+}
+
+#[test]
+fn a_thing_before_the_camera_for_a_while_is_an_event_and_takes_no_steps() {
+    let mut k = 0;
+    let filled = 60..100;
+    let cover = |image: &mut DepthImage| {
+        if filled.contains(&k) {
+            image.values.fill(300);
+        }
+        k += 1;
+    };
+    let found = assessed(Changed::new(WALK.len(), cover)).unwrap();
+    assert!(codes(&found).contains("blocked_camera"), "{:?}", codes(&found));
+    let event = found.quality.events.iter().find(|event| event.kind == "blocked_camera").unwrap();
+    assert_eq!((event.n_frames, event.subject.as_str()), (40, "camera"));
+    for step in &found.gait.as_ref().unwrap().steps {
+        assert!(!(3.2..4.9).contains(&step.heel_strike_s), "{step:?}");
+    }
+}
+
+#[test]
+fn somebody_who_leaves_takes_no_steps_afterwards() {
+    let background = DepthReader::background(&read(&WALK_BYTES)).cloned().unwrap();
+    let mut k = 0;
+    let leave = |image: &mut DepthImage| {
+        if k >= 80 {
+            image.values.clone_from(&background.values);
+        }
+        k += 1;
+    };
+    let found = assessed(Changed::new(WALK.len(), leave)).unwrap();
+    assert!(found.gait.as_ref().unwrap().steps.iter().all(|step| step.heel_strike_s < 4.3));
+    assert!(found.quality.events.iter().any(|e| e.kind == "lost_leg" && e.start_s < 4.8), "{:?}", found.quality.events);
+    assert!(codes(&found).contains("legs_often_unseen"), "{:?}", codes(&found));
+}
+
+#[test]
+fn somebody_else_behind_adds_no_step_to_the_means() {
+    let other = WalkerSettings::of_seed(Course::Standing, 5);
+    let mut other = WalkerSettings { rate_hz: 20.0, duration_s: 6.5, ..other };
+    other.mount = WALK.settings().mount;
+    other.mount.distance_m += 0.5;
+    let other = WalkerSimulation::new(&other, trousers()).unwrap().frame(30).image;
+    let both = |image: &mut DepthImage| {
+        // Codes grow with depth: the nearer one hides the other.
+        for (value, behind) in image.values.iter_mut().zip(&other.values) {
+            *value = (*value).min(*behind);
+        }
+    };
+    let found = assessed(Changed::new(WALK.len(), both)).unwrap();
+    let contacts = true_contacts(&WALK);
+    for step in found.gait.as_ref().unwrap().steps.iter().filter(|step| step.excluded_because.is_empty()) {
+        let is_true = contacts.iter().any(|(side, t)| *side == step.side && (t - step.heel_strike_s).abs() < 0.25);
+        assert!(is_true, "{step:?}: {contacts:.2?}");
+    }
+}
+
+#[test]
+fn intrinsics_of_another_camera_are_refused_or_reported() {
+    let mut frames = Changed::new(60, |_| {});
+    // A Kinect v2, whose images are 512 pixels wide.
+    frames.camera = Intrinsics { fx: 365.0, fy: 365.0, cx: 190.0, cy: 106.0 };
+    assert_eq!(refusal(frames), "intrinsics_mismatch");
+    let mut frames = Changed::new(60, |_| {});
+    frames.camera.fx *= 1.3;
+    frames.camera.fy *= 1.3;
+    let mount = &WALK.settings().mount;
+    frames.mount = DeclaredMount { height: Some(mount.height_m), tilt: Some(mount.tilt) };
+    let found = assessed(frames).unwrap();
+    assert!(codes(&found).contains("mount_mismatch"), "{:?}", codes(&found));
+    assert!(!codes(&assessed(read(&WALK_BYTES)).unwrap()).contains("mount_mismatch"));
+}
+
+#[test]
+fn without_a_background_what_stands_still_is_learned_and_the_walk_is_tracked_as_well() {
+    let mut frames = Changed::new(WALK.len(), |_| {});
+    frames.background = None;
+    let found = assessed(frames).unwrap();
+    let mut errors: Vec<f64> = Vec::new();
+    for k in 0..WALK.len() {
+        let truth = WALK.truth(k);
+        let apart = truth.legs[0].ankle.x - truth.legs[1].ankle.x;
+        errors.push((f64::from(series(&found, "step_width_sensor_m").value[k]) - apart).abs());
+    }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!(mean < 0.015, "step width: {mean} m");
+    assert!(codes(&found).contains("no_background"));
+}
+
+#[test]
+fn real_images_of_bodies_without_a_floor_give_no_steps_and_say_so() {
+    let root = std::env::var_os("SUREFOOT_DATA").map_or_else(|| "../shared/data".into(), std::path::PathBuf::from);
+    for (name, unit) in [("raw11", DepthUnit::Raw11), ("mm", DepthUnit::Millimetres)] {
+        let path = root.join(format!("depth/kinect_v1_people/skeltrack_{name}.u16le.xz"));
+        let Ok(stream) = std::fs::read(&path) else {
+            println!("skipped: no {}", path.display());
+            continue;
+        };
+        let camera = r#"{"fx": 580, "fy": 580, "cx": 319.5, "cy": 239.5, "rate_hz": 30}"#;
+        let camera = CameraFile { unit: Some(unit), ..serde_json::from_str(camera).unwrap() };
+        let mut recording = Cursor::new(Vec::new());
+        assert_eq!(import_depth(&stream[..], None, &camera, &mut recording).unwrap(), 8);
+        let recording = recording.into_inner();
+        let reader = DepthReader::open(&recording[..], &Limits::default()).unwrap();
+        match assessed(reader) {
+            Err(PipelineError::Unsuitable { code, .. }) => assert!(["no_floor", "no_legs"].contains(&code), "{code}"),
+            Err(other) => panic!("{other}"),
+            // A body's flat front may pass for a floor, and arms for legs; they do not step.
+            Ok(found) => {
+                assert!(found.gait.as_ref().unwrap().steps.is_empty(), "{:?}", found.gait);
+                assert!(
+                    codes(&found).is_superset(&BTreeSet::from(["no_background", "no_steps"])),
+                    "{:?}",
+                    codes(&found)
+                );
+            }
+        }
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod sources;
 mod table;
 mod verdict_table;
 mod walker;
+mod walker_sweep;
 mod watch;
 
 use super::noise_model::NoiseModelChoice;

@@ -1,9 +1,12 @@
 //! `surefoot evaluate walker`: tracked legs beside the truth of simulated walks.
 
+use super::walker_sweep;
 use crate::evaluation::walker::MethodErrors;
 use crate::evaluation::walker::comparison::{WalkError, compare};
 use crate::evaluation::walker::method::WalkerMethod;
+use crate::evaluation::walker::sequences::Condition;
 use crate::synthetic::walker::cesium::body_from_glb;
+use crate::synthetic::walker::trousers::trousers;
 use crate::synthetic::walker::{Course, WalkerSettings, WalkerSimulation};
 use anyhow::Context;
 use std::fs;
@@ -18,7 +21,8 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  surefoot evaluate walker\n  surefoot evaluate walker --seeds 3 --missing 0.3 --json\n  \
-    surefoot evaluate walker --methods baseline,fitted,cue1,cue2,both,rgb --particles 5000"
+    surefoot evaluate walker --methods baseline,fitted,cue1,cue2,both,rgb --particles 5000\n  \
+    surefoot evaluate walker --conditions all --seeds 2\n  surefoot evaluate walker --conditions turn,narrow --first-seed 9 --seeds 1"
 )]
 pub(super) struct WalkerArgs {
     /// The figure that walks [default: depth/assets/CesiumMan.glb below $SUREFOOT_DATA, else ../shared/data]
@@ -27,6 +31,13 @@ pub(super) struct WalkerArgs {
     /// Sequences
     #[arg(long, default_value_t = 6, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
+    /// The first of the seeds
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    first_seed: u64,
+    /// Judge the default tracker on walks that are hard in one way each, by both figures, steps and intervals included:
+    /// names separated by commas, or `all`; the other options but --figure, --seeds and --json do not apply
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = conditions)]
+    conditions: Vec<Vec<Condition>>,
     /// Share of the legs' pixels that are missing, 0 to 0.9
     #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
     missing: f64,
@@ -55,8 +66,14 @@ pub(super) fn run(args: &WalkerArgs, out: &mut dyn Write) -> anyhow::Result<()> 
     let path = args.figure.clone().unwrap_or_else(usual);
     let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let body = body_from_glb(&bytes)?;
+    let seeds = args.first_seed..args.first_seed + args.seeds;
+    if !args.conditions.is_empty() {
+        let figures = [("trousers", trousers()), ("cesium", body)];
+        let seeds: Vec<u64> = seeds.collect();
+        return walker_sweep::run(&args.conditions.concat(), &seeds, &figures, args.json, out);
+    }
     let mut sequences = Vec::new();
-    for seed in 1..=args.seeds {
+    for seed in seeds {
         let mut settings = WalkerSettings::of_seed(Course::Straight, seed);
         if let Some(tilt) = args.tilt {
             settings = settings.with_tilt(tilt.to_radians());
@@ -131,6 +148,18 @@ fn write_paper_table(
         line("all", "Mean", &mut (0..methods.len()).map(|k| cell(mean(k))))?;
     }
     Ok(())
+}
+
+/// The condition of a name; all of them for `all`.
+fn conditions(name: &str) -> Result<Vec<Condition>, String> {
+    if name == "all" {
+        return Ok(Condition::ALL.to_vec());
+    }
+    let found = Condition::ALL.into_iter().find(|condition| condition.name() == name);
+    found.map(|condition| vec![condition]).ok_or_else(|| {
+        let names = Condition::ALL.map(Condition::name).join(", ");
+        format!("there is no condition `{name}`; there are all, {names}")
+    })
 }
 
 fn write_row(seed: u64, errors: &MethodErrors, out: &mut dyn Write) -> std::io::Result<()> {

@@ -2,15 +2,11 @@
 
 pub mod comparison;
 pub mod method;
+pub mod scores;
+pub mod sequences;
 
-use crate::assessment::LegPoseSettings;
-use crate::body::Side;
 use crate::geometry::camera::Intrinsics;
-use crate::pipeline::PipelineError;
-use crate::pipeline::leg_pose::leg_model::LegPoint;
-use crate::pipeline::leg_pose::two_legs::TwoLegs;
-use crate::pipeline::leg_pose::{DepthFrames, Legs, track};
-use crate::progress::Monitor;
+use crate::pipeline::leg_pose::DepthFrames;
 use crate::recording::DecodeError;
 use crate::recording::depth::DepthImage;
 use crate::synthetic::walker::{FrameTruth, WalkerFrame, WalkerSimulation};
@@ -33,40 +29,6 @@ pub struct MethodErrors {
     pub ankle_m: Option<f64>,
     /// Frames in which a leg was lost.
     pub n_lost: usize,
-}
-
-/// What the baseline and the tracker made of one simulated walk.
-///
-/// # Errors
-/// When the walk cannot be tracked at all.
-pub fn evaluate(simulation: &WalkerSimulation, settings: &LegPoseSettings) -> Result<Vec<MethodErrors>, PipelineError> {
-    let mut feet: Vec<Option<[Vector3<f64>; 2]>> = Vec::new();
-    let mut watch = |_: i64, foreground: &crate::pipeline::leg_pose::foreground::Foreground| {
-        let legs = TwoLegs::find(&foreground.points);
-        feet.push(legs.map(|legs| Side::BOTH.map(|side| legs.foot(side))));
-    };
-    let track = track(SimulatedFrames::new(simulation), settings, &mut watch, &Monitor::default())?;
-    let truth: Vec<FrameTruth> = (0..simulation.len()).map(|k| simulation.truth(k)).collect();
-    let mut baseline = Errors::default();
-    let mut tracked = Errors::default();
-    for (k, truth) in truth.iter().enumerate() {
-        let ankles = true_ankles(truth);
-        if let Some(Some(feet)) = feet.get(k) {
-            baseline.add(truth, &ankles, feet);
-        }
-        let legs: Option<&Legs> = track.frames.get(k).and_then(|frame| frame.legs.as_ref());
-        let Some(legs) = legs.filter(|legs| legs.lost == [false; 2]) else {
-            tracked.n_lost += 1;
-            continue;
-        };
-        let found = Side::BOTH.map(|side| *legs.point(side, LegPoint::Ankle));
-        tracked.add(truth, &ankles, &found);
-        for (side, found) in Side::BOTH.into_iter().zip(&found) {
-            let point = truth.legs[side as usize].ankle.coords;
-            tracked.ankles.push((track.floor.sensor_from_point(found) - point).norm());
-        }
-    }
-    Ok(vec![baseline.summary("baseline", truth.len()), tracked.summary(settings.mode.name(), truth.len())])
 }
 
 /// The ankles on axes of the floor as the truth has them: right in the image, up, towards the camera.
@@ -123,7 +85,7 @@ fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
 /// The images of a simulated walk, rendered as they are asked for.
 struct SimulatedFrames<'a> {
     frames: Box<dyn Iterator<Item = WalkerFrame> + 'a>,
-    background: DepthImage,
+    background: Option<DepthImage>,
     camera: Intrinsics,
 }
 
@@ -131,7 +93,7 @@ impl<'a> SimulatedFrames<'a> {
     fn new(simulation: &'a WalkerSimulation) -> Self {
         Self {
             frames: Box::new(simulation.frames()),
-            background: simulation.background(),
+            background: Some(simulation.background()),
             camera: *simulation.intrinsics(),
         }
     }
@@ -150,6 +112,6 @@ impl DepthFrames for SimulatedFrames<'_> {
     }
 
     fn background(&self) -> Option<&DepthImage> {
-        Some(&self.background)
+        self.background.as_ref()
     }
 }

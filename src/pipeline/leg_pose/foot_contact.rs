@@ -48,9 +48,10 @@ impl Phase {
     fn log_likelihood(self, sample: &FeetSample) -> f64 {
         /// Feet roll while both are down: relative speed, m/s.
         const ROLLING_SD: f64 = 0.16;
-        /// A foot swings at this speed against the other, m/s; from shuffling to brisk.
-        const SWING_SPEED: f64 = 1.0;
-        const SWING_SPEED_SD: f64 = 0.55;
+        /// A foot swings at this speed against the other, m/s; the first, short step of a walk and a shuffle are slow, and
+        /// what is faster is no less likely.
+        const SWING_SPEED: f64 = 0.6;
+        const SWING_SPEED_SD: f64 = 0.4;
         /// A swinging foot is this much higher, metres.
         const SWING_HEIGHT: f64 = 0.03;
         const HEIGHT_SD: f64 = 0.04;

@@ -10,7 +10,7 @@ use crate::geometry::camera::{DepthMap, Intrinsics};
 use nalgebra::Vector3;
 
 /// Inverse depth per raw step of a Kinect v1, 1/m (\[walker\] Eq. 1).
-const INVERSE_DEPTH_STEP: f32 = 0.00307;
+pub(super) const INVERSE_DEPTH_STEP: f32 = 0.00307;
 /// Steps by which a pixel must differ from the background.
 const MIN_STEPS: f32 = 3.0;
 /// Points lower than this are floor, metres at 1 m distance: the plane's tolerance.
@@ -23,6 +23,12 @@ const DENSE_BELOW: f64 = 0.16;
 const DENSE_STRIDE: usize = 3;
 /// Pixels between two points above; a multiple of the dense one.
 const SPARSE_STRIDE: usize = 6;
+/// Share of the image that near things fill from which on they are no legs: two thick thighs at 0.6 m fill half of it.
+const BLOCKED_SHARE: f64 = 0.7;
+/// Share of the image without depth from which on nothing is seen.
+const BLIND_SHARE: f64 = 0.97;
+/// The focal length for which a pixel counts as one, pixels: that of a Kinect v1.
+const REFERENCE_FOCAL: f64 = 580.0;
 
 /// The part of space in which legs are looked for, in `sensor`, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +52,7 @@ impl Default for Region {
 pub struct ForegroundPoint {
     /// Position in `floor`, metres.
     pub position: Vector3<f64>,
-    /// Pixels that the point stands for.
+    /// Pixels that the point stands for, as a Kinect v1 has them.
     pub pixels: f64,
 }
 
@@ -59,6 +65,8 @@ pub struct Foreground {
     pub missing: f64,
     /// Share of the pixels with a depth that are as in the background, 0 to 1; 1 without a background.
     pub unchanged: f64,
+    /// True when nothing is seen, or when something fills the image: then there are no points.
+    pub blocked: bool,
 }
 
 /// What every frame of a recording is prepared with.
@@ -67,6 +75,8 @@ pub struct Preparation {
     camera: Intrinsics,
     floor: Floor,
     region: Region,
+    /// Pixels between points near the floor.
+    stride: usize,
     /// Inverse depth of the background, 1/m; 0 where it is not known.
     background: Vec<f32>,
 }
@@ -75,7 +85,9 @@ impl Preparation {
     /// Prepares for frames of this camera. Without a background the floor's plane alone is removed.
     pub fn new(camera: Intrinsics, floor: Floor, region: Region, background: Option<&DepthMap>) -> Self {
         let background = background.map_or(Vec::new(), |b| b.depth.iter().map(|z| inverse(*z)).collect());
-        Self { camera, floor, region, background }
+        // Cameras of other resolutions give as many points.
+        let stride = ((DENSE_STRIDE as f64 * camera.fx / REFERENCE_FOCAL).round() as usize).max(1);
+        Self { camera, floor, region, stride, background }
     }
 
     /// The floor that points are given on.
@@ -86,6 +98,39 @@ impl Preparation {
     /// The camera.
     pub fn camera(&self) -> &Intrinsics {
         &self.camera
+    }
+
+    /// Pixels between the looked-at ones.
+    pub(super) fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Takes what was learned to stand still (inverse depths, 1/m) in place of a background, and drops it from frames that
+    /// were prepared before.
+    pub(super) fn learn<'a>(
+        &mut self,
+        still: Vec<f32>,
+        width: usize,
+        earlier: impl Iterator<Item = &'a mut Foreground>,
+    ) {
+        self.background = still;
+        let this = &*self;
+        for foreground in earlier {
+            foreground.points.retain(|point| {
+                let in_sensor = this.floor.sensor_from_point(&point.position);
+                this.camera.pixel_of_point(&in_sensor).is_none_or(|place| {
+                    let [i, j] = place.map(|k| k.round().max(0.0) as usize);
+                    this.is_changed(j * width + i, in_sensor.z as f32)
+                })
+            });
+        }
+    }
+
+    /// True where a pixel at this depth shows something within the region and above the floor.
+    pub(super) fn is_above_floor(&self, [i, j]: [usize; 2], z: f32) -> bool {
+        let in_sensor = self.camera.point_in_sensor(i as f64, j as f64, f64::from(z));
+        let height = self.floor.point_from_sensor(&in_sensor).y;
+        self.region.contains(&in_sensor) && (DENSE_BELOW..MAX_HEIGHT).contains(&height)
     }
 
     /// True where a pixel with this depth is not as in the background.
@@ -99,10 +144,12 @@ impl Preparation {
     /// The points of one frame.
     pub fn prepare(&self, image: &DepthMap) -> Foreground {
         let mut result = Foreground::default();
-        let (mut looked_at, mut seen, mut unchanged) = (0_u32, 0_u32, 0_u32);
-        let rotation = self.floor.floor_from_sensor.matrix();
-        for j in (0..image.height).step_by(DENSE_STRIDE) {
-            for i in (0..image.width).step_by(DENSE_STRIDE) {
+        let (mut looked_at, mut seen, mut unchanged, mut near) = (0_u32, 0_u32, 0_u32, 0_u32);
+        let (dense, sparse) = (self.stride, self.stride * SPARSE_STRIDE / DENSE_STRIDE);
+        let pixel_weight = (REFERENCE_FOCAL / self.camera.fx) * (REFERENCE_FOCAL / self.camera.fy);
+        let up = self.floor.floor_from_sensor.matrix().row(1).transpose();
+        for j in (0..image.height).step_by(dense) {
+            for i in (0..image.width).step_by(dense) {
                 looked_at += 1;
                 let pixel = j * image.width + i;
                 let z = image.depth[pixel];
@@ -115,22 +162,27 @@ impl Preparation {
                     continue;
                 }
                 let in_sensor = self.camera.point_in_sensor(i as f64, j as f64, f64::from(z));
-                if !self.region.contains(&in_sensor) {
+                let height = up.dot(&in_sensor) + self.floor.camera_height;
+                if height < FLOOR_TOLERANCE * in_sensor.z.max(1.0).powi(2) {
                     continue;
                 }
-                let height = rotation.row(1).transpose().dot(&in_sensor) + self.floor.camera_height;
-                if !(FLOOR_TOLERANCE * in_sensor.z.max(1.0).powi(2)..MAX_HEIGHT).contains(&height) {
+                near += u32::from(in_sensor.z < self.region.depth[1]);
+                if height >= MAX_HEIGHT || !self.region.contains(&in_sensor) {
                     continue;
                 }
-                let sparse = i % SPARSE_STRIDE == 0 && j % SPARSE_STRIDE == 0;
-                if height < DENSE_BELOW || sparse {
-                    let stride = if height < DENSE_BELOW { DENSE_STRIDE } else { SPARSE_STRIDE };
+                let is_low = height < DENSE_BELOW;
+                if is_low || (i % sparse == 0 && j % sparse == 0) {
+                    let stride = if is_low { dense } else { sparse };
                     let position = self.floor.point_from_sensor(&in_sensor);
-                    result.points.push(ForegroundPoint { position, pixels: (stride * stride) as f64 });
+                    result.points.push(ForegroundPoint { position, pixels: (stride * stride) as f64 * pixel_weight });
                 }
             }
         }
         result.missing = 1.0 - f64::from(seen) / f64::from(looked_at.max(1));
+        result.blocked = result.missing > BLIND_SHARE || f64::from(near) > BLOCKED_SHARE * f64::from(looked_at.max(1));
+        if result.blocked {
+            result.points.clear();
+        }
         result.unchanged = if self.background.is_empty() { 1.0 } else { f64::from(unchanged) / f64::from(seen.max(1)) };
         result
     }

@@ -98,5 +98,5 @@ pub fn adult_shape() -> ShapeVector {
 
 /// How much adults differ from [`adult_shape`]: standard deviations, metres.
 pub fn adult_shape_deviation() -> ShapeVector {
-    ShapeVector::from([0.06, 0.06, 0.020, 0.015, 0.012, 0.012, 0.008, 0.006])
+    ShapeVector::from([0.04, 0.04, 0.020, 0.015, 0.015, 0.020, 0.008, 0.006])
 }

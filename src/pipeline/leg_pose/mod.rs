@@ -19,6 +19,7 @@ pub mod leg_model;
 pub mod paper;
 mod report;
 pub mod smoother;
+pub mod static_scene;
 pub mod steps;
 pub mod surface_fit;
 pub mod tracker;
@@ -39,6 +40,7 @@ use leg_model::{LegPoint, LegSegment, POINTS, ShapeVector, adult_shape, adult_sh
 use nalgebra::Vector3;
 use paper::PaperRun;
 use smoother::{SmoothedFrame, Smoother};
+use static_scene::StaticScene;
 use std::io::Read;
 use surface_fit::SEGMENTS;
 use tracker::{Tracker, calibrate, visibility};
@@ -52,9 +54,6 @@ const CALIBRATION_STRIDE: usize = 2;
 const CALIBRATION_PATIENCE: usize = 450;
 /// Frames in which a floor is looked for when there is no background.
 const FLOOR_PATIENCE: usize = 30;
-/// What differs from body to body between a fitted point and the joint: standard deviation of hip, knee, ankle and toe,
-/// metres; from simulated walks.
-const BODY_SD: [f64; 4] = [0.04, 0.010, 0.012, 0.020];
 /// A leg of which less than this share of shank and foot is seen is bridged.
 const SEEN_SHARE: f64 = 0.08;
 
@@ -77,6 +76,19 @@ pub trait DepthFrames {
     fn side_images(&self) -> Option<&SideImages> {
         None
     }
+    /// What the recording says of the camera's mount.
+    fn declared_mount(&self) -> DeclaredMount {
+        DeclaredMount::default()
+    }
+}
+
+/// What a recording says of the camera's mount, when it says anything.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DeclaredMount {
+    /// Height of the camera above the floor, metres.
+    pub height: Option<f64>,
+    /// Tilt of the camera downwards, radians.
+    pub tilt: Option<f64>,
 }
 
 impl<R: Read> DepthFrames for DepthReader<R> {
@@ -91,6 +103,13 @@ impl<R: Read> DepthFrames for DepthReader<R> {
     fn background(&self) -> Option<&DepthImage> {
         DepthReader::background(self)
     }
+
+    fn declared_mount(&self) -> DeclaredMount {
+        self.calibration().map_or_else(DeclaredMount::default, |calibration| DeclaredMount {
+            height: calibration.camera_height_m,
+            tilt: calibration.camera_tilt_deg.map(f64::to_radians),
+        })
+    }
 }
 
 /// Both legs in one frame.
@@ -98,7 +117,8 @@ impl<R: Read> DepthFrames for DepthReader<R> {
 pub struct Legs {
     /// Hip, knee, ankle and toe of the left leg, then of the right, in `floor`, metres.
     pub points: [Vector3<f64>; POINTS],
-    /// Standard deviations along the axes of `floor`, metres.
+    /// Standard deviations along the axes of `floor` as the images have them, without what differs from body to body,
+    /// metres.
     pub deviations: [Vector3<f64>; POINTS],
     /// Velocities of the points, m/s.
     pub velocities: [Vector3<f64>; POINTS],
@@ -143,6 +163,8 @@ pub struct TrackedFrame {
     pub time_ns: i64,
     /// The legs; none when there are none in the image.
     pub legs: Option<Legs>,
+    /// True when the camera saw nothing, or something filled its image.
+    pub blocked: bool,
 }
 
 /// A tracked recording.
@@ -152,6 +174,8 @@ pub struct Track {
     pub floor: Floor,
     /// The camera.
     pub camera: Intrinsics,
+    /// What the recording says of its mount.
+    pub declared_mount: DeclaredMount,
     /// The legs' shape; none when there were no legs.
     pub shape: Option<ShapeVector>,
     /// Every frame of the recording.
@@ -174,19 +198,20 @@ pub fn assess(
     settings: &LegPoseSettings,
     monitor: &Monitor,
 ) -> Result<Assessment, PipelineError> {
-    Ok(assess_with_track(frames, settings, monitor)?.0)
+    Ok(assess_watched(frames, settings, &mut |_, _| {}, monitor)?.0)
 }
 
-/// As [`assess`], with the track that the assessment rests on.
+/// As [`assess`], with the track that the assessment rests on; `watch` sees each prepared frame.
 ///
 /// # Errors
 /// As [`assess`].
-pub fn assess_with_track(
+pub fn assess_watched(
     frames: impl DepthFrames,
     settings: &LegPoseSettings,
+    watch: &mut dyn FnMut(i64, &Foreground),
     monitor: &Monitor,
 ) -> Result<(Assessment, Track), PipelineError> {
-    let track = track(frames, settings, &mut |_, _| {}, monitor)?;
+    let track = track(frames, settings, watch, monitor)?;
     monitor.begin(Step::Summarizing, 0)?;
     Ok((report::assessment(&track, settings)?, track))
 }
@@ -246,11 +271,16 @@ struct Run {
     waiting_with_legs: usize,
     /// Images that were read before the floor was known.
     early: std::collections::VecDeque<(i64, DepthMap)>,
+    declared_mount: DeclaredMount,
     tracker: Option<(Tracker, ShapeVector)>,
     smoother: Smoother,
-    times: Vec<i64>,
-    smoothed: Vec<(i64, Legs)>,
+    /// Time of each frame, and whether it was blocked.
+    times: Vec<(i64, bool)>,
+    /// Time and legs of tracked frames, and whether a track begins with them.
+    smoothed: Vec<(i64, Legs, bool)>,
     has_background: bool,
+    /// What stands still, as long as it is being learned: without a background, until the tracker begins.
+    static_scene: Option<StaticScene>,
     sums: [f64; 2],
 }
 
@@ -264,6 +294,13 @@ impl Run {
         let background = frames.background().map(DepthImage::to_depth_map);
         let mut floor = background.as_ref().and_then(|map| Floor::find(map, &camera));
         let mut early = std::collections::VecDeque::new();
+        if let Some(time_ns) = frames.next_into(&mut image)? {
+            check_intrinsics(&camera, &image)?;
+            early.push_back((time_ns, image.to_depth_map()));
+        }
+        if let (None, Some((_, map))) = (&floor, early.front()) {
+            floor = Floor::find(map, &camera);
+        }
         while floor.is_none() && early.len() < FLOOR_PATIENCE {
             let Some(time_ns) = frames.next_into(&mut image)? else { break };
             let map = image.to_depth_map();
@@ -278,14 +315,17 @@ impl Run {
             ));
         };
         let region = Region { depth: settings.depth_m, x: settings.x_m };
+        let preparation = Preparation::new(camera, floor, region, background.as_ref());
         Ok(Self {
             has_background: background.is_some(),
-            preparation: Preparation::new(camera, floor, region, background.as_ref()),
+            static_scene: background.is_none().then(|| StaticScene::new(preparation.stride())),
+            preparation,
             image,
             map: DepthMap::empty(0, 0),
             waiting: Vec::new(),
             waiting_with_legs: 0,
             early,
+            declared_mount: frames.declared_mount(),
             tracker: None,
             smoother: Smoother::default(),
             times: Vec::new(),
@@ -296,18 +336,23 @@ impl Run {
 
     /// The next frame, prepared.
     fn next(&mut self, frames: &mut impl DepthFrames) -> Result<Option<(i64, Foreground)>, PipelineError> {
-        if let Some((time_ns, map)) = self.early.pop_front() {
+        let time_ns = if let Some((time_ns, map)) = self.early.pop_front() {
             self.map = map;
-            return Ok(Some((time_ns, self.preparation.prepare(&self.map))));
+            time_ns
+        } else {
+            let Some(time_ns) = frames.next_into(&mut self.image)? else { return Ok(None) };
+            self.image.write_depth(&mut self.map);
+            time_ns
+        };
+        if let Some(scene) = &mut self.static_scene {
+            scene.add(&self.map);
         }
-        let Some(time_ns) = frames.next_into(&mut self.image)? else { return Ok(None) };
-        self.image.write_depth(&mut self.map);
         Ok(Some((time_ns, self.preparation.prepare(&self.map))))
     }
 
     /// Notes what is known of a frame whoever tracks it.
     fn count(&mut self, time_ns: i64, foreground: &Foreground) {
-        self.times.push(time_ns);
+        self.times.push((time_ns, foreground.blocked));
         self.sums[0] += foreground.missing;
         self.sums[1] += foreground.unchanged;
     }
@@ -332,6 +377,11 @@ impl Run {
 
     /// Finds the shape and catches up with the frames that waited for it.
     fn begin_tracking(&mut self) {
+        if let Some(scene) = self.static_scene.take()
+            && let Some(still) = scene.background(&self.preparation, self.map.width, self.map.height)
+        {
+            self.preparation.learn(still, self.map.width, self.waiting.iter_mut().map(|(_, foreground)| foreground));
+        }
         let height = self.preparation.floor().camera_height;
         let used = self.waiting.iter().step_by(CALIBRATION_STRIDE);
         let used = used.map(|(time_ns, foreground)| (*time_ns, foreground.points.as_slice()));
@@ -358,7 +408,7 @@ impl Run {
         let focal = self.preparation.camera().fx;
         self.smoothed.extend(ready.into_iter().map(|frame| {
             let legs = legs_of(&frame, shape, focal, camera_height);
-            (frame.fit.time_ns, legs)
+            (frame.fit.time_ns, legs, frame.fit.restarted)
         }));
     }
 
@@ -377,20 +427,22 @@ impl Run {
             (self.smoothed, shape) = (paper.frames, paper.shape);
             effective_sample_size = paper.effective_sample_size;
         }
+        put_sides_right(&mut self.smoothed);
         let mut tracked = self.smoothed.into_iter().peekable();
-        let mut frames: Vec<TrackedFrame> = self
+        let frames: Vec<TrackedFrame> = self
             .times
             .iter()
-            .map(|&time_ns| TrackedFrame {
+            .map(|&(time_ns, blocked)| TrackedFrame {
                 time_ns,
-                legs: tracked.next_if(|(time, _)| *time == time_ns).map(|(_, legs)| legs),
+                legs: tracked.next_if(|(time, ..)| *time == time_ns).map(|(_, legs, _)| legs),
+                blocked,
             })
             .collect();
-        put_sides_right(&mut frames);
         let count = frames.len().max(1) as f64;
         Track {
             floor: self.preparation.floor().clone(),
             camera: *self.preparation.camera(),
+            declared_mount: self.declared_mount,
             shape,
             frames,
             effective_sample_size,
@@ -398,6 +450,31 @@ impl Run {
             unchanged: self.has_background.then_some(self.sums[1] / count),
         }
     }
+}
+
+/// Refuses intrinsics that cannot be those of the images' camera.
+fn check_intrinsics(camera: &Intrinsics, image: &DepthImage) -> Result<(), PipelineError> {
+    /// Where the optical axis of an image that is not cut out of another one may be, as a share of its sides.
+    const CENTRE: std::ops::Range<f64> = 0.3..0.7;
+    /// Angles of view of depth cameras, degrees: a Kinect v1 has 58, wide ones 120.
+    const VIEW_DEG: std::ops::Range<f64> = 25.0..125.0;
+    let (width, height) = (image.width as f64, image.height as f64);
+    let view = 2.0 * (0.5 * width / camera.fx).atan().to_degrees();
+    let is_own = CENTRE.contains(&(camera.cx / width))
+        && CENTRE.contains(&(camera.cy / height))
+        && VIEW_DEG.contains(&view)
+        && (0.8..1.25).contains(&(camera.fx / camera.fy));
+    if is_own {
+        return Ok(());
+    }
+    Err(PipelineError::unsuitable(
+        "intrinsics_mismatch",
+        format!(
+            "the intrinsics (fx {:.0}, fy {:.0}, cx {:.0}, cy {:.0} pixels) are not those of a camera with images of \
+             {width} × {height} pixels; send those of the depth camera at this resolution",
+            camera.fx, camera.fy, camera.cx, camera.cy
+        ),
+    ))
 }
 
 fn seconds(time_ns: i64) -> f64 {
@@ -408,9 +485,7 @@ fn legs_of(frame: &SmoothedFrame, shape: &ShapeVector, focal: f64, camera_height
     let place = |k: usize| (Side::BOTH[k / 4], LegPoint::ALL[k % 4]);
     Legs {
         points: std::array::from_fn(|k| point_of(&frame.pose, place(k).0, place(k).1)),
-        deviations: std::array::from_fn(|k| {
-            point_of(&frame.deviation, place(k).0, place(k).1).map(|sd| sd.hypot(BODY_SD[k % 4]))
-        }),
+        deviations: std::array::from_fn(|k| point_of(&frame.deviation, place(k).0, place(k).1)),
         velocities: std::array::from_fn(|k| point_of(&frame.velocity, place(k).0, place(k).1)),
         visibility: std::array::from_fn(|s| {
             visibility(&frame.fit, shape, Side::BOTH[s / 3], LegSegment::ALL[s % 3], focal, camera_height) as f32
@@ -420,17 +495,16 @@ fn legs_of(frame: &SmoothedFrame, shape: &ShapeVector, focal: f64, camera_height
     }
 }
 
-/// Exchanges left and right where a stretch began with the legs crossed: over a stretch the left leg is on the right in the
+/// Exchanges left and right where a track began with the legs crossed: over a track the left leg is on the right in the
 /// image.
-fn put_sides_right(frames: &mut [TrackedFrame]) {
-    for stretch in frames.chunk_by_mut(|a, b| a.legs.is_some() == b.legs.is_some()) {
-        let apart: f64 = stretch
+fn put_sides_right(frames: &mut [(i64, Legs, bool)]) {
+    for track in frames.chunk_by_mut(|_, (.., begins)| !begins) {
+        let apart: f64 = track
             .iter()
-            .filter_map(|frame| frame.legs.as_ref())
-            .map(|legs| legs.point(Side::Left, LegPoint::Knee).x - legs.point(Side::Right, LegPoint::Knee).x)
+            .map(|(_, legs, _)| legs.point(Side::Left, LegPoint::Knee).x - legs.point(Side::Right, LegPoint::Knee).x)
             .sum();
         if apart < 0.0 {
-            stretch.iter_mut().filter_map(|frame| frame.legs.as_mut()).for_each(Legs::exchange_sides);
+            track.iter_mut().for_each(|(_, legs, _)| legs.exchange_sides());
         }
     }
 }

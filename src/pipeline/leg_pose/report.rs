@@ -3,7 +3,7 @@
 use super::floor_motion::FeetFrame;
 use super::leg_model::{LegPoint, adult_shape, adult_shape_deviation};
 use super::steps::gait;
-use super::{Legs, Track, seconds};
+use super::{Legs, Track, TrackedFrame, seconds};
 use crate::assessment::quality::{Event, EventCount};
 use crate::assessment::series::FLAG_BRIDGED;
 use crate::assessment::{
@@ -15,6 +15,11 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// 97.5 % point of the normal distribution.
 const NORMAL_975: f64 = 1.96;
+/// What differs from body to body between a fitted point and the joint: standard deviation of hip, knee, ankle and toe,
+/// metres; from simulated walks.
+const BODY_SD: [f64; 4] = [0.04, 0.025, 0.012, 0.020];
+/// What of it does not cancel between the ankles, along x, y and z of `floor`, metres.
+const APART_BODY_SD: Vector3<f64> = Vector3::new(0.004, 0.008, 0.006);
 /// Points on neither leg, as a share of the foreground, from which on something else is in sight.
 const FOREIGN_SHARE: f64 = 0.35;
 /// Share of pixels as in the background below which the background is of another place. A person behind a walker hides
@@ -111,7 +116,7 @@ fn value(channel: LegChannel, legs: &Legs, track: &Track, squares: &Matrix3<f64>
         let k = point.index(side);
         let in_sensor = track.floor.sensor_from_point(&legs.points[k]);
         let variance = squares * legs.deviations[k].map(|sd| sd * sd);
-        Some((in_sensor[axis], variance[axis].sqrt(), legs.is_seen(side)))
+        Some((in_sensor[axis], variance[axis].sqrt().hypot(BODY_SD[point as usize]), legs.is_seen(side)))
     };
     let apart = |axis: usize, in_sensor: bool| {
         if legs.lost != [false; 2] {
@@ -120,6 +125,7 @@ fn value(channel: LegChannel, legs: &Legs, track: &Track, squares: &Matrix3<f64>
         let [left, right] = Side::BOTH.map(|side| LegPoint::Ankle.index(side));
         let mut between = legs.points[left] - legs.points[right];
         let mut variance = legs.deviations[left].map(|s| s * s) + legs.deviations[right].map(|s| s * s);
+        variance += APART_BODY_SD.map(|s| s * s);
         if in_sensor {
             between = track.floor.floor_from_sensor.inverse() * between;
             variance = squares * variance;
@@ -143,12 +149,21 @@ fn quality(track: &Track, gait: &Gait) -> Quality {
     intervals.sort_by(f64::total_cmp);
     let n_seen = track.frames.iter().filter(|frame| sees_both(frame.legs.as_ref())).count();
     let coverage = n_seen as f64 / track.frames.len().max(1) as f64;
-    let events: Vec<Event> = Side::BOTH.into_iter().flat_map(|side| lost_legs(track, side, &times)).collect();
-    let count = EventCount {
-        kind: LOST_LEG.to_owned(),
-        n_events: events.len() as u64,
-        n_frames: events.iter().map(|event| event.n_frames).sum(),
+    let lost = |side: Side| {
+        let is_lost = move |frame: &TrackedFrame| frame.legs.as_ref().is_none_or(|legs| legs.lost[side as usize]);
+        stretches(track, &times, LOST_LEG, &format!("{}_leg", side.name()), is_lost)
     };
+    let mut events: Vec<Event> = Side::BOTH.into_iter().flat_map(lost).collect();
+    events.extend(stretches(track, &times, BLOCKED_CAMERA, "camera", |frame| frame.blocked));
+    let event_counts = [LOST_LEG, BLOCKED_CAMERA].map(|kind| {
+        let own = events.iter().filter(|event| event.kind == kind);
+        EventCount {
+            kind: kind.to_owned(),
+            n_events: own.clone().count() as u64,
+            n_frames: own.map(|event| event.n_frames).sum(),
+        }
+    });
+    events.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     Quality {
         n_frames: times.len() as u64,
         duration_s: times.last().map_or(0.0, |last| last - times[0]),
@@ -158,28 +173,35 @@ fn quality(track: &Track, gait: &Gait) -> Quality {
         effective_sample_size: track.effective_sample_size,
         warnings: warnings(track, gait, coverage),
         events,
-        event_counts: vec![count],
+        event_counts: event_counts.to_vec(),
         ..Quality::default()
     }
 }
 
 /// Kind of event: a leg was not tracked.
 const LOST_LEG: &str = "lost_leg";
+/// Kind of event: the camera saw nothing, or something filled its image.
+const BLOCKED_CAMERA: &str = "blocked_camera";
 
 fn sees_both(legs: Option<&Legs>) -> bool {
     legs.is_some_and(|legs| Side::BOTH.iter().all(|side| legs.is_seen(*side)))
 }
 
-/// Stretches in which a leg was not tracked.
-fn lost_legs(track: &Track, side: Side, times: &[f64]) -> Vec<Event> {
-    let is_lost = |k: &usize| track.frames[*k].legs.as_ref().is_none_or(|legs| legs.lost[side as usize]);
+/// Stretches of frames of which something holds.
+fn stretches(
+    track: &Track,
+    times: &[f64],
+    kind: &str,
+    subject: &str,
+    holds: impl Fn(&TrackedFrame) -> bool,
+) -> Vec<Event> {
     let frames: Vec<usize> = (0..track.frames.len()).collect();
     frames
-        .chunk_by(|a, b| is_lost(a) == is_lost(b))
-        .filter(|stretch| is_lost(&stretch[0]))
+        .chunk_by(|a, b| holds(&track.frames[*a]) == holds(&track.frames[*b]))
+        .filter(|stretch| holds(&track.frames[stretch[0]]))
         .map(|stretch| Event {
-            kind: LOST_LEG.to_owned(),
-            subject: format!("{}_leg", side.name()),
+            kind: kind.to_owned(),
+            subject: subject.to_owned(),
             start_s: times[stretch[0]] - times[0],
             end_s: times[stretch[stretch.len() - 1]] - times[0],
             n_frames: stretch.len() as u64,
@@ -195,6 +217,8 @@ fn warnings(track: &Track, gait: &Gait, coverage: f64) -> Vec<Warning> {
         let (expected, deviation) = (adult_shape(), adult_shape_deviation());
         (0..2).any(|k| (shape[k] - expected[k]).abs() > IMPLAUSIBLE_SDS * deviation[k])
     });
+    let n_blocked = track.frames.iter().filter(|frame| frame.blocked).count();
+    let off_mount = off_mount(track);
     let found = [
         (
             true,
@@ -231,6 +255,20 @@ fn warnings(track: &Track, gait: &Gait, coverage: f64) -> Vec<Warning> {
             "the legs' lengths are at the limit of what adults have; check the camera's intrinsics".to_owned(),
         ),
         (
+            off_mount.is_some(),
+            "mount_mismatch",
+            off_mount.unwrap_or_default(),
+        ),
+        (
+            n_blocked > 0,
+            "blocked_camera",
+            format!(
+                "in {n_blocked} of {} frames the camera saw nothing or something filled its image; the legs there are not \
+                 measured",
+                track.frames.len()
+            ),
+        ),
+        (
             coverage < LEAST_COVERAGE,
             "legs_often_unseen",
             format!("both lower legs are seen in {} of the frames only", percent(coverage)),
@@ -252,4 +290,21 @@ fn warnings(track: &Track, gait: &Gait, coverage: f64) -> Vec<Warning> {
         ),
     ];
     found.into_iter().filter(|(is, ..)| *is).map(|(_, code, sentence)| Warning::new(code, sentence)).collect()
+}
+
+/// How the floor that was found differs from what the recording says of the camera's mount, when it does.
+fn off_mount(track: &Track) -> Option<String> {
+    /// What a tape measure and a spirit level on a walker are good for, metres and radians.
+    const HEIGHT_TOLERANCE: f64 = 0.06;
+    const TILT_TOLERANCE: f64 = 5.0 * std::f64::consts::PI / 180.0;
+    let (height, tilt) = (track.floor.camera_height, track.floor.tilt());
+    let is_off = track.declared_mount.height.is_some_and(|said| (said - height).abs() > HEIGHT_TOLERANCE)
+        || track.declared_mount.tilt.is_some_and(|said| (said - tilt).abs() > TILT_TOLERANCE);
+    is_off.then(|| {
+        format!(
+            "the camera is said to be mounted otherwise than {height:.2} m above the floor and tilted down by {:.0} degrees, as \
+             its images show; the intrinsics may be those of another camera, and lengths wrong by as much",
+            tilt.to_degrees()
+        )
+    })
 }

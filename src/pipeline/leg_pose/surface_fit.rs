@@ -29,7 +29,19 @@ const INDEPENDENT_POINTS: f64 = 30.0;
 const SEGMENT_TRUST: [f64; 3] = [10.0, 20.0, 1.0];
 /// How exactly thigh, shank and foot have their lengths, metres: joint centres move in a bent joint, and a foot bends at
 /// the ball when its heel rises.
-const LENGTH_SD: [f64; 3] = [0.008, 0.004, 0.050];
+const LENGTH_SD: [f64; 3] = [0.008, 0.003, 0.050];
+/// Trouser legs hang below the ankle, and the trunk goes on above the hip: so far surfaces go on straight, so that their
+/// points do not pull the joint along the bone, metres.
+const OPEN_BELOW_ANKLE: f64 = 0.08;
+/// See [`OPEN_BELOW_ANKLE`].
+const OPEN_ABOVE_HIP: f64 = 0.3;
+/// The middle of a shoe's rear lies this much below the ankle, metres; were a foot's axis to begin at the ankle, the low
+/// upper of the shoe would pull the ankle down.
+const FOOT_DROP: f64 = 0.05;
+/// Least height of the ankle's centre above the floor, metres: 0.039 of stature (Winter) and a shoe's sole.
+const ANKLE_HEIGHT: f64 = 0.09;
+/// Points higher than this below upright hips are trunk, arms and what hangs from them, metres.
+const BELOW_HIPS: f64 = 0.05;
 /// A foot is wider than high: half the width of its flat part at ankle and toes, metres.
 const FLAT_HALF_WIDTH: [f64; 2] = [0.005, 0.018];
 /// Number of segments of both legs.
@@ -54,6 +66,8 @@ struct Cone {
     start: Vector3<f64>,
     axis: Vector3<f64>,
     inverse_squared_length: f64,
+    /// Where the surface begins and ends, as shares of the axis.
+    range: [f64; 2],
     radii: [f64; 2],
     /// Unit vector across a foot, level; zero for round segments.
     across: Vector3<f64>,
@@ -61,6 +75,7 @@ struct Cone {
 
 struct Touch {
     segment: usize,
+    /// Place along the axis, 0 to 1, and beyond 1 on a trouser leg's end.
     t: f64,
     normal: Vector3<f64>,
     residual: f64,
@@ -69,7 +84,10 @@ struct Touch {
 fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
     std::array::from_fn(|s| {
         let (side, segment) = side_and_segment(s);
-        let start = point_of(pose, side, segment.start());
+        let mut start = point_of(pose, side, segment.start());
+        if segment == LegSegment::Foot {
+            start.y -= FOOT_DROP;
+        }
         let axis = point_of(pose, side, segment.end()) - start;
         let (_, [first, last]) = segment.shape_indices();
         let inverse_squared_length = 1.0 / axis.norm_squared().max(1e-6);
@@ -77,7 +95,12 @@ fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
             LegSegment::Foot => Vector3::new(axis.z, 0.0, -axis.x).try_normalize(1e-6).unwrap_or_else(Vector3::zeros),
             _ => Vector3::zeros(),
         };
-        Cone { start, axis, inverse_squared_length, radii: [shape[first], shape[last]], across }
+        let range = match segment {
+            LegSegment::Thigh => [-OPEN_ABOVE_HIP * inverse_squared_length.sqrt(), 1.0],
+            LegSegment::Shank => [0.0, 1.0 + OPEN_BELOW_ANKLE * inverse_squared_length.sqrt()],
+            LegSegment::Foot => [0.0, 1.0],
+        };
+        Cone { start, axis, inverse_squared_length, range, radii: [shape[first], shape[last]], across }
     })
 }
 
@@ -91,12 +114,12 @@ fn touch(cones: &[Cone; SEGMENTS], point: &Vector3<f64>) -> Option<Touch> {
     let mut best: Option<Touch> = None;
     for (segment, cone) in cones.iter().enumerate() {
         let from_start = point - cone.start;
-        let t = (from_start.dot(&cone.axis) * cone.inverse_squared_length).clamp(0.0, 1.0);
+        let t = (from_start.dot(&cone.axis) * cone.inverse_squared_length).clamp(cone.range[0], cone.range[1]);
         let mut from_axis = from_start - cone.axis * t;
-        let half_width = FLAT_HALF_WIDTH[0] + t * (FLAT_HALF_WIDTH[1] - FLAT_HALF_WIDTH[0]);
+        let half_width = FLAT_HALF_WIDTH[0] + t.clamp(0.0, 1.0) * (FLAT_HALF_WIDTH[1] - FLAT_HALF_WIDTH[0]);
         from_axis -= cone.across * from_axis.dot(&cone.across).clamp(-half_width, half_width);
         let distance = from_axis.norm();
-        let residual = distance - (cone.radii[0] + t * (cone.radii[1] - cone.radii[0]));
+        let residual = distance - (cone.radii[0] + t.clamp(0.0, 1.0) * (cone.radii[1] - cone.radii[0]));
         if best.as_ref().is_none_or(|b| residual < b.residual) && distance > 1e-6 {
             best = Some(Touch { segment, t, normal: from_axis / distance, residual });
         }
@@ -122,7 +145,8 @@ pub fn linearise(
     let mut weights = [0.0; SEGMENTS];
     let mut support = [0.0; SEGMENTS];
     let (mut explained, mut misfit, mut total) = (0.0, 0.0, 0.0);
-    for point in points {
+    let top = ANKLE_HEIGHT + shape[0] + shape[1] - BELOW_HIPS;
+    for point in points.iter().filter(|point| point.position.y < top) {
         total += point.pixels;
         let Some(touch) = touch(&cones, &point.position) else {
             misfit += point.pixels;
@@ -139,7 +163,16 @@ pub fn linearise(
         let weight = robust * point.pixels;
         let n = &touch.normal;
         let (u, t) = (1.0 - touch.t, touch.t);
-        let row = SVector::<f64, 8>::from([-u * n.x, -u * n.y, -u * n.z, -t * n.x, -t * n.y, -t * n.z, -u, -t]);
+        let row = SVector::<f64, 8>::from([
+            -u * n.x,
+            -u * n.y,
+            -u * n.z,
+            -t * n.x,
+            -t * n.y,
+            -t * n.z,
+            -u.clamp(0.0, 1.0),
+            -t.clamp(0.0, 1.0),
+        ]);
         blocks[touch.segment].syger(weight, &row, &row, 1.0);
         vectors[touch.segment].axpy(weight * touch.residual, &row, 1.0);
         weights[touch.segment] += weight;
@@ -243,8 +276,6 @@ impl NormalEquations {
         const FORWARD_SD: f64 = 0.05;
         const SIDEWAYS_SD: f64 = 0.06;
         const FLOOR_SD: f64 = 0.002;
-        /// Least height of the ankle's centre above the floor, metres: 0.039 of stature (Winter) and a shoe's sole.
-        const ANKLE_HEIGHT: f64 = 0.098;
         let [ankle, toe] = [LegPoint::Ankle, LegPoint::Toe].map(|p| 3 * p.index(side));
         let length = shape[2];
         self.add(pose[toe + 2] - pose[ankle + 2] - 0.9 * length, FORWARD_SD, &[(toe + 2, 1.0), (ankle + 2, -1.0)]);
@@ -277,10 +308,12 @@ impl NormalEquations {
     /// Knees and ankles do not go through each other.
     fn add_clearance(&mut self, pose: &PoseVector, shape: &ShapeVector) {
         const CLEARANCE_SD: f64 = 0.005;
+        /// Bones may come this near, as a share of the radii of what is around them: cloth gives way.
+        const CLEARANCE: f64 = 0.5;
         for (point, radius) in [(LegPoint::Knee, shape[4]), (LegPoint::Ankle, shape[5])] {
             let between = point_of(pose, Side::Left, point) - point_of(pose, Side::Right, point);
             let distance = between.norm().max(1e-3);
-            let residual = distance - 2.0 * 0.8 * radius;
+            let residual = distance - 2.0 * CLEARANCE * radius;
             if residual < 0.0 {
                 let n = between / distance;
                 let [left, right] = Side::BOTH.map(|side| 3 * point.index(side));

@@ -13,6 +13,8 @@ pub struct CameraMount {
     pub tilt: f64,
     /// Turn to the walker's left, radians: a camera that is not mounted straight.
     pub yaw: f64,
+    /// Turn about the direction of view, radians; positive lowers the right side of the image's floor.
+    pub roll: f64,
     /// Mean distance from the user's pelvis along the floor, metres.
     pub distance_m: f64,
 }
@@ -80,7 +82,8 @@ impl CameraPath {
 fn walker_from_sensor(mount: &CameraMount) -> Matrix3<f64> {
     let back = Rotation3::from_axis_angle(&Vector3::y_axis(), mount.yaw) * -Vector3::z();
     let z = back * mount.tilt.cos() - Vector3::y() * mount.tilt.sin();
-    let x = (-Vector3::y()).cross(&back);
+    let level = (-Vector3::y()).cross(&back);
+    let x = level * mount.roll.cos() + z.cross(&level) * mount.roll.sin();
     Matrix3::from_columns(&[x, z.cross(&x), z])
 }
 
@@ -89,7 +92,7 @@ mod tests {
     use super::*;
 
     fn path(tilt: f64) -> CameraPath {
-        let mount = CameraMount { height_m: 0.5, tilt, yaw: 0.0, distance_m: 1.1 };
+        let mount = CameraMount { height_m: 0.5, tilt, yaw: 0.0, roll: 0.0, distance_m: 1.1 };
         let walk = |k: i32| PelvisPose { place: Vector3::new(0.0, 0.0, 0.005 * f64::from(k)), heading: 0.0 };
         CameraPath::new(mount, &(0..1000).map(walk).collect::<Vec<_>>(), 4)
     }

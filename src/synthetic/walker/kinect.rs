@@ -62,6 +62,8 @@ pub struct SensorErrors {
     pub is_noisy: bool,
     /// Share of the person's pixels that are missing in patches, 0 to 0.9.
     pub missing_share: f64,
+    /// Factor of the random error of the codes; 1 is a Kinect v1's half a code.
+    pub code_noise: f64,
 }
 
 /// A scene as an ideal camera sees it.
@@ -131,7 +133,7 @@ pub fn image(view: &View, camera: &Intrinsics, errors: &SensorErrors, seed: u64,
                 continue;
             }
             let shared = (field(Field::Shared, WINDOW_PX, i, j) - 0.5) / SMOOTH_SD;
-            let error = WHITE_CODES * f64::from(white[own]) + SHARED_CODES * shared;
+            let error = errors.code_noise * (WHITE_CODES * f64::from(white[own]) + SHARED_CODES * shared);
             out.values[own] = code(view.depth[pixel], error);
         }
     }
@@ -228,7 +230,7 @@ mod tests {
     use super::*;
 
     const CAMERA: Intrinsics = Intrinsics { fx: 580.0, fy: 580.0, cx: 319.5, cy: 239.5 };
-    const NOISY: SensorErrors = SensorErrors { is_noisy: true, missing_share: 0.0 };
+    const NOISY: SensorErrors = SensorErrors { is_noisy: true, missing_share: 0.0, code_noise: 1.0 };
 
     /// A wall at `far` with a board at `near` in front of its middle.
     fn board(near: f32, far: f32) -> View {
@@ -282,7 +284,7 @@ mod tests {
     #[test]
     fn the_asked_for_share_of_the_person_is_missing() {
         let view = board(0.8, 1.4);
-        let errors = SensorErrors { is_noisy: false, missing_share: 0.3 };
+        let errors = SensorErrors { is_noisy: false, missing_share: 0.3, code_noise: 1.0 };
         let image = image(&view, &CAMERA, &errors, 1, 5);
         let person = (0..640 * 480).filter(|p| view.is_person[*p]);
         let missing = person.clone().filter(|p| image.values[*p] == MISSING_RAW).count();

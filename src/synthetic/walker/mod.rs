@@ -180,6 +180,11 @@ impl WalkerSimulation {
         }
     }
 
+    /// Every footprint of the plan, in order of contact; the last ones may lie beyond the recording.
+    pub fn footprints(&self) -> &[course::Footprint] {
+        self.gait.footprints()
+    }
+
     /// All steps whose double support ends within the recording, in order.
     pub fn steps(&self) -> Vec<StepTruth> {
         let prints = self.gait.footprints();

@@ -102,7 +102,7 @@ impl WalkerSettings {
             clothes,
             mount: mount(tilt.to_radians(), distance, yaw),
             camera: KINECT_V1,
-            errors: SensorErrors { is_noisy: true, missing_share: 0.0 },
+            errors: SensorErrors { is_noisy: true, missing_share: 0.0, code_noise: 1.0 },
             has_frame: true,
             has_things: true,
         }
@@ -140,8 +140,10 @@ impl WalkerSettings {
             ("holes", self.clothes.holes, 0.0, 0.3),
             ("camera-height", self.mount.height_m, 0.1, 1.5),
             ("tilt-deg", self.mount.tilt.to_degrees(), -10.0, 45.0),
+            ("roll-deg", self.mount.roll.to_degrees(), -20.0, 20.0),
             ("distance", self.mount.distance_m, 0.7, 2.0),
             ("missing", self.errors.missing_share, 0.0, 0.9),
+            ("code-noise", self.errors.code_noise, 0.0, 10.0),
         ];
         for (name, value, low, high) in ranges {
             if !(low..=high).contains(&value) {
@@ -155,5 +157,5 @@ impl WalkerSettings {
 /// The mount with a tilt, at the height from which the lowest row of the image sees the floor in front of the user.
 fn mount(tilt: f64, distance_m: f64, yaw: f64) -> CameraMount {
     let down = tilt + (KINECT_V1.cy / KINECT_V1.fy).atan();
-    CameraMount { height_m: (distance_m - FLOOR_SEEN_AHEAD_M) * down.tan(), tilt, yaw, distance_m }
+    CameraMount { height_m: (distance_m - FLOOR_SEEN_AHEAD_M) * down.tan(), tilt, yaw, roll: 0.0, distance_m }
 }

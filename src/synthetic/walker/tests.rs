@@ -100,7 +100,7 @@ fn steps_are_as_long_and_wide_as_asked_and_ankles_are_closer_than_footprints() {
 fn the_image_shows_the_legs_where_the_truth_says() {
     for body in [Some(trousers()), cesium()].into_iter().flatten() {
         let settings = WalkerSettings {
-            errors: kinect::SensorErrors { is_noisy: false, missing_share: 0.0 },
+            errors: kinect::SensorErrors { is_noisy: false, missing_share: 0.0, code_noise: 1.0 },
             ..settings(Course::Straight, 2)
         };
         let simulation = WalkerSimulation::new(&settings, body).unwrap();

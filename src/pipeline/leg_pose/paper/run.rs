@@ -15,7 +15,7 @@ use crate::geometry::floor::Floor as LevelFloor;
 use crate::pipeline::leg_pose::floor::Floor;
 use crate::pipeline::leg_pose::foreground::Region;
 use crate::pipeline::leg_pose::leg_model::{POINTS, ShapeVector};
-use crate::pipeline::leg_pose::{BODY_SD, Legs, seconds};
+use crate::pipeline::leg_pose::{Legs, seconds};
 use crate::recording::side_camera::{SideCamera, SideImages};
 use nalgebra::{Unit, Vector3};
 
@@ -52,8 +52,8 @@ struct PaperFrame {
 
 /// What the paper's tracker made of a recording.
 pub struct PaperResult {
-    /// Frames with legs and their times, nanoseconds.
-    pub frames: Vec<(i64, Legs)>,
+    /// Frames with legs, their times in nanoseconds, and whether a track begins with them.
+    pub frames: Vec<(i64, Legs, bool)>,
     /// Mean of the frames' lengths and radii; none without legs.
     pub shape: Option<ShapeVector>,
     /// Effective sample size over the frames; none without legs.
@@ -122,7 +122,7 @@ impl PaperRun {
             points: std::array::from_fn(|k| self.floor.point_from_sensor(&joints[k])),
             deviations: std::array::from_fn(|k| {
                 let variance = squares * estimate.joint_sd[k].map(|sd| sd * sd);
-                variance.map(|v| v.sqrt().hypot(BODY_SD[k % 4]))
+                variance.map(f64::sqrt)
             }),
             velocities: [Vector3::zeros(); POINTS],
             visibility: shares,
@@ -140,7 +140,7 @@ impl PaperRun {
             add_velocities(stretch);
         }
         PaperResult {
-            frames: self.frames.into_iter().map(|frame| (frame.time_ns, frame.legs)).collect(),
+            frames: self.frames.into_iter().map(|frame| (frame.time_ns, frame.legs, frame.starts)).collect(),
             shape: has_legs.then(|| self.shapes / count),
             effective_sample_size: has_legs.then(|| EffectiveSampleSize::of_frames(particles, self.sample_sizes)),
         }

@@ -6,10 +6,12 @@ use crate::assessment::gait::{
     ANKLES_AT_MID_DOUBLE_SUPPORT, ExcludedSteps, FLAT_FOOTPRINTS, Gait, Step, StepMeasure, StepSummary,
 };
 use crate::body::Side;
-use nalgebra::Vector2;
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// A foot that moves less than this against the other, metres, shifts its weight; it does not step.
 const MIN_SWING: f64 = 0.06;
+/// Share of a swing's fastest speed of the ankle at which the toes leave the floor.
+const TOE_OFF_SPEED: f64 = 0.2;
 /// Bounds of the time of a swing, seconds; walkers' users swing for 0.3 to 0.6.
 const SWING_TIME: std::ops::Range<f64> = 0.12..1.5;
 /// A contact later than this after the one before begins a new walk, seconds: the longest plausible step time
@@ -19,13 +21,18 @@ const MAX_STEP_TIME: f64 = 2.124;
 const END_STEPS: usize = 2;
 /// Share of a step's frames in which both lower legs must be seen.
 const MIN_COVERAGE: f64 = 0.8;
-/// A step during which the floor turns by more than this before the camera is part of a turn, radians.
-const TURN: f64 = 12.0 * std::f64::consts::PI / 180.0;
+/// A step during which the walker turns by more than this is part of a turn, radians: a corner in six steps is 15 degrees
+/// a step.
+const TURN: f64 = 5.0 * std::f64::consts::PI / 180.0;
+/// Way of a standing foot, metres, on which a bend is half believed: a bend of 2 mm on 0.1 m is 9 degrees.
+const NOTHING_SURE: f64 = 0.1;
 /// 97.5 % point of the normal distribution.
 const NORMAL_975: f64 = 1.96;
-/// What differs from body to body between a tracked ankle and the joint, and does not cancel between the feet: standard
-/// deviation along and across, metres; from simulated walks.
-const BODY_SD: Vector2<f64> = Vector2::new(0.005, 0.008);
+/// What differs from body to body between tracked ankles and joints, and does not cancel between the feet: standard
+/// deviation along and across by the definitions of a step, metres; from simulated walks.
+const ANKLE_BODY_SD: [f64; 2] = [0.007, 0.004];
+/// See [`ANKLE_BODY_SD`].
+const PRINT_BODY_SD: [f64; 2] = [0.012, 0.007];
 
 /// A swing, as frame numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +84,7 @@ fn swings(frames: &[FeetFrame], phases: &[Phase]) -> Vec<Swing> {
             k += 1;
         }
         let Phase::Swing { side, backward } = phases[begin] else { continue };
+        let run = begin..k;
         // A swing at either end of the recording is cut off: its contact was not seen.
         if begin == 0 || k == phases.len() {
             continue;
@@ -86,10 +94,18 @@ fn swings(frames: &[FeetFrame], phases: &[Phase]) -> Vec<Swing> {
         let time = frames[k].time - frames[begin].time;
         let seen = frames[begin..k].iter().filter(|f| f.seen).count();
         if way >= MIN_SWING && SWING_TIME.contains(&time) && 2 * seen >= k - begin {
-            swings.push(Swing { side, backward, toe_off: begin, heel_strike: k });
+            swings.push(Swing { side, backward, toe_off: toe_off(frames, side, run), heel_strike: k });
         }
     }
     swings
+}
+
+/// The frame in which the toes leave the floor: the ankle moves before, while the heel rises over the standing toes, but
+/// not as fast as in the air.
+fn toe_off(frames: &[FeetFrame], side: Side, swing: std::ops::Range<usize>) -> usize {
+    let speed = |k: usize| (frames[k].velocity[side as usize].y - frames[k].velocity[side.opposite() as usize].y).abs();
+    let fastest = swing.clone().map(speed).fold(0.0, f64::max);
+    swing.clone().find(|k| speed(*k) >= TOE_OFF_SPEED * fastest).unwrap_or(swing.start)
 }
 
 /// Swings that follow each other without a rest, in one direction.
@@ -106,6 +122,7 @@ fn both_down(frames: &[FeetFrame], walk: &[Swing]) -> f64 {
 
 fn steps_of_walk(frames: &[FeetFrame], displacement: &[Vector2<f64>], walk: &[Swing]) -> Vec<Step> {
     let prints: Vec<Option<Footprint>> = (0..walk.len()).map(|n| footprint(frames, displacement, walk, n)).collect();
+    let turns = turns(frames, walk);
     let mut steps = Vec::with_capacity(walk.len());
     for (n, swing) in walk.iter().enumerate() {
         let before = n.checked_sub(1).map(|m| walk[m]);
@@ -129,7 +146,7 @@ fn steps_of_walk(frames: &[FeetFrame], displacement: &[Vector2<f64>], walk: &[Sw
             }
         };
         exclude("first_or_last", n < END_STEPS || n + END_STEPS >= walk.len());
-        exclude("turning", turned(frames, displacement, begin, end).abs() > TURN);
+        exclude("turning", turns[n].abs() > TURN);
         exclude("low_coverage", coverage < MIN_COVERAGE);
         exclude("missed_contact", !alternates);
         let start = frames[0].time;
@@ -177,7 +194,7 @@ fn ankle_measure(frames: &[FeetFrame], swing: &Swing, at: usize) -> StepMeasure 
     let direction = if swing.backward { -1.0 } else { 1.0 };
     let width = frame.ankle[Side::Left as usize].x - frame.ankle[Side::Right as usize].x;
     let variance = frame.ankle_sd[foot].map(|s| s * s) + frame.ankle_sd[other].map(|s| s * s);
-    measure(ANKLES_AT_MID_DOUBLE_SUPPORT, direction * between.y, width, variance)
+    measure(ANKLES_AT_MID_DOUBLE_SUPPORT, direction * between.y, width, variance, ANKLE_BODY_SD)
 }
 
 /// Step by footprints: needs the prints before and after it of the other foot.
@@ -190,12 +207,12 @@ fn print_measure(swing: &Swing, prints: &[Option<Footprint>], n: usize) -> Optio
     let step = here.position - before.position;
     let across = step.dot(&left) * if swing.side == Side::Left { 1.0 } else { -1.0 };
     let variance = here.sd.map(|s| s * s) + before.sd.map(|s| s * s);
-    Some(measure(FLAT_FOOTPRINTS, step.dot(&u), across, variance))
+    Some(measure(FLAT_FOOTPRINTS, step.dot(&u), across, variance, PRINT_BODY_SD))
 }
 
-fn measure(definition: &str, length: f64, width: f64, variance: Vector2<f64>) -> StepMeasure {
-    let half_length = NORMAL_975 * (variance.y + BODY_SD.x.powi(2)).sqrt();
-    let half_width = NORMAL_975 * (variance.x + BODY_SD.y.powi(2)).sqrt();
+fn measure(definition: &str, length: f64, width: f64, variance: Vector2<f64>, body_sd: [f64; 2]) -> StepMeasure {
+    let half_length = NORMAL_975 * (variance.y + body_sd[0].powi(2)).sqrt();
+    let half_width = NORMAL_975 * (variance.x + body_sd[1].powi(2)).sqrt();
     StepMeasure {
         definition: definition.to_owned(),
         length_m: length,
@@ -205,13 +222,58 @@ fn measure(definition: &str, length: f64, width: f64, variance: Vector2<f64>) ->
     }
 }
 
-/// Angle by which the floor turns before the camera between two frames, radians: a walker on wheels turns about its rear
-/// axle, so what it turns by shows as a sideways motion of the floor where the user stands.
-fn turned(frames: &[FeetFrame], displacement: &[Vector2<f64>], begin: usize, end: usize) -> f64 {
-    let sideways = displacement[end].x - displacement[begin].x;
-    let middle = &frames[(begin + end) / 2];
-    let distance = 0.5 * (middle.ankle[0].y + middle.ankle[1].y).abs();
-    (sideways / distance.max(0.3)).atan()
+/// Angle by which the walker turns during each step of a walk, radians.
+///
+/// A walker turns about its wheels near the user, so a turn hardly shifts the floor where the user stands; but the path of a
+/// standing foot before the camera bends: it is a parabola x(z) whose direction changes by the angle of the turn. One step
+/// has a bend of a few millimetres, so three together are looked at, each by the square of its way.
+fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
+    let bends: Vec<(f64, f64)> = walk
+        .iter()
+        .map(|swing| {
+            let standing = swing.side.opposite() as usize;
+            let path: Vec<Vector2<f64>> =
+                frames[swing.toe_off..=swing.heel_strike].iter().map(|frame| frame.ankle[standing]).collect();
+            bend(&path)
+        })
+        .collect();
+    let step_share = |n: usize| {
+        let step = (frames[walk[n].heel_strike].time
+            - n.checked_sub(1).map_or(f64::NAN, |m| frames[walk[m].heel_strike].time))
+            / (frames[walk[n].heel_strike].time - frames[walk[n].toe_off].time);
+        if step.is_finite() { step.clamp(1.0, 2.0) } else { 1.5 }
+    };
+    (0..walk.len())
+        .map(|n| {
+            let around = n.saturating_sub(1)..(n + 2).min(walk.len());
+            let (sum, weight) = around.fold((0.0, 0.0), |(sum, total), k| {
+                let (angle, way) = bends[k];
+                (sum + angle * step_share(k) * way * way, total + way * way)
+            });
+            // A step of a few centimetres bends by chance.
+            if weight > 0.0 { sum / weight * (weight / (weight + NOTHING_SURE * NOTHING_SURE)) } else { 0.0 }
+        })
+        .collect()
+}
+
+/// Change of direction along a path and its extent along z: the parabola x(z) of least squares.
+fn bend(path: &[Vector2<f64>]) -> (f64, f64) {
+    let n = path.len() as f64;
+    let mean = path.iter().sum::<Vector2<f64>>() / n;
+    let (first, last) = (path[0].y, path[path.len() - 1].y);
+    let way = (last - first).abs();
+    let mut matrix = Matrix3::zeros();
+    let mut vector = Vector3::zeros();
+    for place in path {
+        let z = place.y - mean.y;
+        let row = Vector3::new(1.0, z, z * z);
+        matrix += row * row.transpose();
+        vector += row * (place.x - mean.x);
+    }
+    match matrix.lu().solve(&vector) {
+        Some(parabola) if way > 0.0 => (2.0 * parabola[2] * (last - first), way),
+        _ => (0.0, 0.0),
+    }
 }
 
 /// Counts and means over the steps that count.
