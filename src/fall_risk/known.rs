@@ -51,6 +51,7 @@ impl Person {
 pub struct Answers {
     /// Falls in the past twelve months.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0, maximum = 366)]
     pub falls_12_months: Option<u32>,
     /// A fall in that time caused an injury that needed care.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -72,6 +73,7 @@ pub struct Answers {
     pub worries_about_falling: Option<bool>,
     /// Medicines taken.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0, maximum = 100)]
     pub medicines: Option<u32>,
     /// Takes a psychotropic medicine.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,9 +86,11 @@ pub struct Answers {
     pub feels_ankle_filament: Option<bool>,
     /// Falls Efficacy Scale International, 16 to 64.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 16, maximum = 64)]
     pub falls_efficacy: Option<u32>,
     /// Physiological Profile Assessment, z-score, as measured with its instruments.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = -10, maximum = 10)]
     pub physiological_profile_z: Option<f64>,
     /// Lives at home, not in an institution.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -134,12 +138,15 @@ pub struct Measured {
     pub value: f64,
     /// Its standard error, in the same unit; for the mean of n steps their SD / √n.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0)]
     pub standard_error: Option<f64>,
     /// Observations that it rests on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 1000000)]
     pub n_observations: Option<u32>,
     /// Standard deviation of the error of one observation, in the same unit, for measures of variability.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0)]
     pub error_sd: Option<f64>,
 }
 
@@ -202,6 +209,7 @@ pub struct Measures {
 const POSSIBLE_S: std::ops::RangeInclusive<f64> = 0.0..=600.0;
 const POSSIBLE_COUNT: std::ops::RangeInclusive<f64> = 0.0..=100.0;
 const POSSIBLE_MPS: std::ops::RangeInclusive<f64> = 0.0..=5.0;
+const POSSIBLE_OBSERVATIONS: std::ops::RangeInclusive<u32> = 1..=1_000_000;
 const POSSIBLE_M: std::ops::RangeInclusive<f64> = -1.0..=1.0;
 
 impl Measures {
@@ -254,8 +262,8 @@ impl Measures {
             if !is_error(measured.standard_error) || !is_error(measured.error_sd) {
                 found.push((name, "standard_error and error_sd must be at least 0".to_owned()));
             }
-            if measured.n_observations == Some(0) {
-                found.push((name, "n_observations must be at least 1".to_owned()));
+            if measured.n_observations.is_some_and(|n| !POSSIBLE_OBSERVATIONS.contains(&n)) {
+                found.push((name, "n_observations must be between 1 and 1000000".to_owned()));
             }
         }
         found
