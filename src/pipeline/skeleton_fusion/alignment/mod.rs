@@ -310,17 +310,45 @@ pub fn align(evidence: &Evidence<'_>, tuning: &AlignmentTuning, earlier: Option<
         }
     }
     let mut stretch = vec![0.0; vectors.len()];
-    for iteration in 0..MAX_ITERATIONS {
+    let (mut iterations, mut may_begin_again) = (0, true);
+    loop {
         let equations = equations::assemble(evidence, &vectors, &alignment, &stretch, tuning);
         let (factor, step) = equations.factor()?;
         let moved = equations::apply(&mut alignment, &mut stretch, &step, LARGEST_STEP);
-        if moved < CONVERGED || iteration + 1 == MAX_ITERATIONS {
-            alignment.covariance = factor.inverse();
-            break;
+        iterations += 1;
+        if moved >= CONVERGED && iterations < MAX_ITERATIONS {
+            continue;
         }
+        if may_begin_again && headings_from_mountings(&mut alignment) {
+            (iterations, may_begin_again) = (0, false);
+            continue;
+        }
+        alignment.covariance = factor.inverse();
+        break;
     }
     doubt_impossible_hinges(evidence, &mut alignment);
     Some(alignment)
+}
+
+/// Puts mountings by the scheme back that the steps have turned far away from it, and turns their headings instead; true when
+/// there were any. A bone that hangs down is turned in the same way by either, and where its heading began far off, steps
+/// may end with the wrong one.
+fn headings_from_mountings(alignment: &mut Alignment) -> bool {
+    let mut any = false;
+    for unit in alignment.units.iter_mut().filter(|unit| unit.mounting == MountingFound::Scheme) {
+        let scheme = unit.bone.scheme_from_imu().inverse();
+        let away = UnitQuaternion::from_rotation_matrix(&(scheme.inverse() * unit.imu_from_bone));
+        if away.angle() <= SCHEME_WITHIN {
+            continue;
+        }
+        let about_bone = 2.0 * away.imag().dot(&unit.bone.direction()).atan2(away.w);
+        unit.imu_from_bone = scheme;
+        for course in &mut unit.headings {
+            course.values.iter_mut().for_each(|heading| *heading -= about_bone);
+        }
+        any = true;
+    }
+    any
 }
 
 /// Marks both units of a limb as not determined whose hinge would leave what joints can do: their mountings, found from
