@@ -5,9 +5,11 @@ pub mod fusion_quality;
 pub mod fusion_settings;
 pub mod gait;
 pub mod joint_angles;
+pub mod joint_track;
 pub mod leg_pose;
 pub mod leg_pose_settings;
 pub mod noise_model;
+pub mod performance;
 pub mod provenance;
 pub mod quality;
 pub mod series;
@@ -17,9 +19,11 @@ pub use fusion_quality::{ClockQuality, FusionQuality, UnitQuality};
 pub use fusion_settings::{Clocks, FusionMethod, Mounting, SkeletonFusionSettings};
 pub use gait::Gait;
 pub use joint_angles::AngleChannel;
+pub use joint_track::JointTrack;
 pub use leg_pose::LegChannel;
 pub use leg_pose_settings::{LegCues, LegPoseMode, LegPoseSettings};
 pub use noise_model::{NoiseModel, NoiseModelName, NoiseModelReference};
+pub use performance::{Performance, PerformanceMeasure, PerformanceStatus, Repetition};
 pub use provenance::Provenance;
 pub use quality::{Event, Quality, Warning};
 pub use series::{ChannelSummary, Series};
@@ -38,6 +42,10 @@ pub struct Assessment {
     pub summary: Vec<ChannelSummary>,
     /// Steps, when the pipeline finds steps.
     pub gait: Option<Gait>,
+    /// Where joints were, when the recording has a skeleton.
+    pub joints: Option<JointTrack>,
+    /// How the exercise or test was performed; none until it is measured.
+    pub performance: Option<Performance>,
     /// How far the result can be trusted.
     pub quality: Quality,
     /// What is needed to compute the same bytes again.

@@ -5,7 +5,7 @@ pub mod leg_pose;
 pub mod skeleton_fusion;
 
 use crate::assessment::quality::CalibrationQuality;
-use crate::assessment::{Assessment, NoiseModel, Settings};
+use crate::assessment::{Assessment, JointTrack, NoiseModel, Settings};
 use crate::progress::{Cancelled, Monitor};
 use crate::recording::{DecodeError, Recording};
 use uuid::Uuid;
@@ -82,7 +82,7 @@ pub fn assess_with(
     inputs: &Inputs,
     monitor: &Monitor,
 ) -> Result<Assessment, PipelineError> {
-    match settings {
+    let assessment = match settings {
         Settings::JointAngles(settings) => joint_angles::assess_with(recording, settings, inputs, monitor),
         Settings::SkeletonFusion(settings) => skeleton_fusion::assess(recording, settings, monitor),
         Settings::LegPose(_) => Err(PipelineError::unsuitable(
@@ -93,5 +93,6 @@ pub fn assess_with(
             "not_an_assessment",
             "a noise model is trained from several recordings; one recording alone is assessed by joint_angles",
         )),
-    }
+    }?;
+    Ok(Assessment { joints: recording.skeleton.as_ref().map(JointTrack::of_skeleton), ..assessment })
 }

@@ -128,6 +128,8 @@ pub fn assessment(bytes: &[u8]) -> Assessment {
     series.value = bytes.iter().map(|b| f32::from(*b)).collect();
     Assessment {
         gait: None,
+        joints: None,
+        performance: None,
         pipeline: "joint_angles",
         time_ns: (0..n as i64).map(|i| i * 33_333_333).collect(),
         summary: vec![series.summarize()],

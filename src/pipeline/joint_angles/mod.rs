@@ -130,6 +130,8 @@ pub fn assess_with(
     let series = builder.finish();
     Ok(Assessment {
         gait: None,
+        joints: None,
+        performance: None,
         pipeline: "joint_angles",
         time_ns: observations.time_ns,
         summary: series.iter().map(Series::summarize).collect(),

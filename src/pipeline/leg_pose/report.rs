@@ -53,6 +53,8 @@ pub(super) fn assessment(track: &Track, settings: &LegPoseSettings) -> Result<As
         series,
         quality: quality(track, &gait),
         gait: Some(gait),
+        joints: None,
+        performance: None,
         provenance: Provenance {
             software_version: env!("CARGO_PKG_VERSION").to_owned(),
             pipeline: "leg_pose".to_owned(),

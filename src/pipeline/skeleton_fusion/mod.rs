@@ -117,6 +117,8 @@ pub fn assess(
     quality.fusion = Some(fusion);
     Ok(Assessment {
         gait: None,
+        joints: None,
+        performance: None,
         pipeline: "skeleton_fusion",
         time_ns: grid.times_ns(),
         summary: series.iter().map(Series::summarize).collect(),

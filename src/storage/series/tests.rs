@@ -8,7 +8,17 @@ use proptest::prelude::*;
 fn assessment(time_ns: Vec<i64>, series: Vec<Series>) -> Assessment {
     let summary = series.iter().map(Series::summarize).collect();
     let (quality, provenance) = (Quality::default(), Provenance::default());
-    Assessment { pipeline: "joint_angles", time_ns, series, summary, gait: None, quality, provenance }
+    Assessment {
+        pipeline: "joint_angles",
+        time_ns,
+        series,
+        summary,
+        gait: None,
+        joints: None,
+        performance: None,
+        quality,
+        provenance,
+    }
 }
 
 /// Stores an assessment as the end of a job does.

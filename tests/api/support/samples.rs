@@ -86,6 +86,8 @@ pub fn known_result() -> Arc<Assess> {
         let series = vec![ramp, gaps];
         Ok(Assessment {
             gait: None,
+            joints: None,
+            performance: None,
             pipeline: "joint_angles",
             time_ns: (0..KNOWN_SAMPLES as i64).map(|t| t * 10_000_000).collect(),
             summary: series.iter().map(Series::summarize).collect(),
