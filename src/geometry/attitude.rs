@@ -79,6 +79,29 @@ pub fn left_jacobian(attitude: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * c + k * k * third
 }
 
+/// Inverse of [`left_jacobian`], in closed form; none at a full turn (but not at zero), where there is none.
+///
+/// ```text
+/// J⁻¹ = 1 − ½ [θ]× + (1 − ½θ cot ½θ) / θ² [θ]×²
+/// ```
+pub fn inverse_left_jacobian(attitude: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    /// Sine of half the angle under which a turn counts as full.
+    const FULL_TURN: f64 = 1e-12;
+    let angle_squared = attitude.norm_squared();
+    let k = attitude.cross_matrix();
+    let second = if angle_squared < SMALL_ANGLE_SQUARED {
+        1.0 / 12.0 + angle_squared / 720.0
+    } else {
+        let half = 0.5 * angle_squared.sqrt();
+        let (sin, cos) = half.sin_cos();
+        if sin.abs() < FULL_TURN {
+            return None;
+        }
+        (1.0 - half * cos / sin) / angle_squared
+    };
+    Some(Matrix3::identity() - k * 0.5 + k * k * second)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,6 +118,13 @@ mod tests {
             let back = attitude_from_rotation(&rotation_from_attitude(&v));
             let same_rotation = nearest_branch(&back, &v);
             prop_assert!((same_rotation - v).norm() < 1e-7, "{v} became {same_rotation}");
+        }
+
+        #[test]
+        fn the_inverse_of_the_left_jacobian_undoes_it(v in attitude(), scale in prop::sample::select(vec![1.0, 1e-3, 1e-6])) {
+            let v = v * scale;
+            let inverse = inverse_left_jacobian(&v).unwrap();
+            prop_assert!((inverse * left_jacobian(&v) - Matrix3::identity()).norm() < 1e-12, "{v}");
         }
 
         #[test]

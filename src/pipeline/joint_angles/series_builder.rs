@@ -12,7 +12,7 @@ use crate::body::pose::{PoseVector, hinge_offset};
 use crate::body::range_of_motion::RangeOfMotion;
 use crate::body::skeleton::point_index;
 use crate::body::{Limb, Side};
-use crate::geometry::attitude::left_jacobian;
+use crate::geometry::attitude::inverse_left_jacobian;
 use nalgebra::{Matrix3, Vector3};
 
 /// Half the width of a 95 % interval in standard deviations.
@@ -20,6 +20,9 @@ const Z95: f64 = 1.959_963_985;
 
 /// Channels: the anatomical angles, then three components of each attitude vector.
 pub const CHANNEL_COUNT: usize = ANGLE_COUNT + 15;
+
+/// Joints with an attitude vector: trunk, then limbs.
+const JOINTS: [usize; 5] = [0, 1, 2, 3, 4];
 
 /// One channel in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,12 +58,18 @@ pub struct FrameRepairs {
 pub struct AngleReader {
     previous: PoseVector,
     previous_angles: Option<Angles>,
-    hinges: [(usize, [f64; 2]); 4],
+    rests_on: [RestsOn; ANGLE_COUNT],
+    ranges: [Option<[f64; 2]>; ANGLE_COUNT],
 }
 
 impl Default for AngleReader {
     fn default() -> Self {
-        Self { previous: PoseVector::zeros(), previous_angles: None, hinges: hinge_bounds() }
+        Self {
+            previous: PoseVector::zeros(),
+            previous_angles: None,
+            rests_on: std::array::from_fn(RestsOn::of),
+            ranges: hinge_ranges(),
+        }
     }
 }
 
@@ -76,23 +85,28 @@ impl AngleReader {
             unobservable[limb_angles(limb).start + 2] = false;
         }
         let theta = frame.pose.to_vector(&self.previous);
+        let attitudes = JOINTS.map(|joint| theta.fixed_rows::<3>(3 * joint).into_owned());
+        let attitude_sds = JOINTS.map(|joint| {
+            let spread = frame.spread.as_ref();
+            spread.map(|spread| attitude_sd(&attitudes[joint], &spread.attitudes[joint]))
+        });
+        let flags_of_angles = self.rests_on.map(|points| points.flags(frame, repairs));
         let readings = std::array::from_fn(|channel| {
             let Some(component) = channel.checked_sub(ANGLE_COUNT) else {
-                let mut flags = dependency_flags(channel, frame, repairs);
+                let mut flags = flags_of_angles[channel];
                 flags |= if singular[channel] { FLAG_SINGULAR } else { 0 };
                 flags |= if unobservable[channel] { FLAG_NOT_OBSERVABLE } else { 0 };
                 let sd = frame.spread.as_ref().map(|spread| spread.angles[channel]);
                 let mut bounds = interval(angles[channel], sd);
-                if let Some((_, range)) = self.hinges.iter().find(|(hinge, _)| *hinge == channel) {
-                    bounds = within(bounds, angles[channel], *range);
+                if let Some(range) = self.ranges[channel] {
+                    bounds = within(bounds, angles[channel], range);
                 }
                 return Reading::new(angles[channel], bounds, flags);
             };
             let (joint, axis) = (component / 3, component % 3);
-            let attitude = theta.fixed_rows::<3>(3 * joint).into_owned();
-            let sd = frame.spread.as_ref().map(|spread| attitude_sd(&attitude, &spread.attitudes[joint])[axis]);
-            let flags = dependency_flags(first_angle_of_joint(joint), frame, repairs);
-            Reading::new(attitude[axis], interval(attitude[axis], sd), flags)
+            let value = attitudes[joint][axis];
+            let flags = flags_of_angles[first_angle_of_joint(joint)];
+            Reading::new(value, interval(value, attitude_sds[joint].map(|sd| sd[axis])), flags)
         });
         self.previous = theta;
         self.previous_angles = Some(angles);
@@ -156,13 +170,15 @@ fn within([low, high]: [f64; 2], value: f64, [least, most]: [f64; 2]) -> [f64; 2
     [low.max(least.min(value)), high.min(most.max(value))]
 }
 
-/// Each hinge's place among the angles and its range of motion, radians: an interval does not leave it.
-fn hinge_bounds() -> [(usize, [f64; 2]); 4] {
+/// The range of motion of each angle that is a hinge, radians: an interval does not leave it.
+fn hinge_ranges() -> [Option<[f64; 2]>; ANGLE_COUNT] {
     let range = RangeOfMotion::healthy_adult();
-    Limb::ALL.map(|limb| {
+    let mut ranges = [None; ANGLE_COUNT];
+    for limb in Limb::ALL {
         let hinge = hinge_offset(limb.index());
-        (limb_angles(limb).start + 3, [range.low[hinge], range.high[hinge]])
-    })
+        ranges[limb_angles(limb).start + 3] = Some([range.low[hinge], range.high[hinge]]);
+    }
+    ranges
 }
 
 /// Brings each angle to the turn nearest to the previous frame's, within ±360°.
@@ -179,7 +195,7 @@ fn unwrap_angles(angles: &mut Angles, previous: &Angles) {
 /// Standard deviation of an attitude vector's components, radians, from the covariance of its error vector.
 fn attitude_sd(attitude: &Vector3<f64>, block: &Matrix3<f64>) -> Vector3<f64> {
     // The error acts on the left: exp(v + δv) = exp(J δv) exp(v). At a full turn J is singular and says nothing.
-    match left_jacobian(attitude).try_inverse() {
+    match inverse_left_jacobian(attitude) {
         Some(inverse) => (inverse * block * inverse.transpose()).diagonal().map(|v| v.max(0.0).sqrt()),
         None => Vector3::repeat(f64::NAN),
     }
@@ -196,20 +212,35 @@ fn first_angle_of_joint(joint: usize) -> usize {
     }
 }
 
-/// Flags of an angle by the points it depends on: the trunk's roots, and the limb's points up to the one that shows it.
-fn dependency_flags(angle: usize, frame: &Summary, repairs: FrameRepairs) -> u8 {
-    let needed = needed_points(angle);
-    let mut flags = if repairs.rejected & needed == 0 { 0 } else { FLAG_OUTLIER };
-    flags |= if repairs.exchanged & needed == 0 { 0 } else { FLAG_SWAP_CORRECTED };
-    let trunk_seen = sees_trunk(frame.seen);
-    let bridged = |is_seen: bool| if is_seen { 0 } else { FLAG_BRIDGED };
-    let Some(limb) = Limb::ALL.into_iter().find(|limb| limb_angles(*limb).contains(&angle)) else {
-        return flags | bridged(trunk_seen);
-    };
-    let is_hinge = angle - limb_angles(limb).start == 3;
-    // The hinge needs no trunk.
-    flags |= frame.limb_flags[limb.index()];
-    flags | bridged(frame.seen & needed == needed && (trunk_seen || is_hinge))
+/// What an angle rests on: the trunk's roots, and the limb's points up to the one that shows it.
+#[derive(Debug, Clone, Copy)]
+struct RestsOn {
+    /// Points that it is seen by.
+    points: SeenMask,
+    /// The limb that it is of, and whether it is the limb's hinge; none for the trunk.
+    limb: Option<(usize, bool)>,
+}
+
+impl RestsOn {
+    fn of(angle: usize) -> Self {
+        let limb = Limb::ALL.into_iter().find(|limb| limb_angles(*limb).contains(&angle));
+        let limb = limb.map(|limb| (limb.index(), angle - limb_angles(limb).start == 3));
+        Self { points: needed_points(angle), limb }
+    }
+
+    /// Flags by what was seen of a frame, and what was done to it.
+    fn flags(self, frame: &Summary, repairs: FrameRepairs) -> u8 {
+        let mut flags = if repairs.rejected & self.points == 0 { 0 } else { FLAG_OUTLIER };
+        flags |= if repairs.exchanged & self.points == 0 { 0 } else { FLAG_SWAP_CORRECTED };
+        let trunk_seen = sees_trunk(frame.seen);
+        let is_seen = match self.limb {
+            None => trunk_seen,
+            // The hinge needs no trunk.
+            Some((_, is_hinge)) => frame.seen & self.points == self.points && (trunk_seen || is_hinge),
+        };
+        flags |= self.limb.map_or(0, |(limb, _)| frame.limb_flags[limb]);
+        flags | if is_seen { 0 } else { FLAG_BRIDGED }
+    }
 }
 
 /// Points that an angle of a limb shows at, or the limbs' roots for one of the trunk: the swing shows at the middle
