@@ -20,6 +20,7 @@ const END_AGE: f64 = 95.0;
 pub(super) static CHAIR30: Rule = Rule {
     info: RuleInfo {
         id: "chair30",
+        measures: &["chair_stands_30_s"],
         version: 1,
         statement: "Fewer rises in 30 s than the average of age and sex mark a risk; using the arms counts 0, more than \
                     halfway up at 30 s counts as a rise",

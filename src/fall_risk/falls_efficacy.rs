@@ -10,6 +10,7 @@ const BANDS: [(u32, &str); 3] = [(28, "high"), (20, "moderate"), (16, "low")];
 pub(super) static FES_I: Rule = Rule {
     info: RuleInfo {
         id: "fes_i",
+        measures: &[],
         version: 1,
         statement: "Concern about falling by the Falls Efficacy Scale International: 16 to 19 low, 20 to 27 moderate, 28 to 64 \
                     high",

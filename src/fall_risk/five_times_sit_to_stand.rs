@@ -6,6 +6,7 @@ use super::rule::{Cutoff, Evidence, Finding, Rule, RuleInfo};
 pub(super) static STS5: Rule = Rule {
     info: RuleInfo {
         id: "sts5",
+        measures: &["five_times_sit_to_stand_s"],
         version: 1,
         statement: "Five rises from a chair, arms folded, that take 12 s or more go with recurrent falls",
         unit: Some("s"),
@@ -22,6 +23,7 @@ pub(super) static STS5: Rule = Rule {
 pub(super) static STS5_RECURRENT: Rule = Rule {
     info: RuleInfo {
         id: "sts5_recurrent",
+        measures: &["five_times_sit_to_stand_s"],
         version: 1,
         statement: "Five rises from a chair that take 15 s or more go with recurrent falls",
         unit: Some("s"),

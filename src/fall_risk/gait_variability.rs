@@ -24,6 +24,7 @@ const SKIADOPOULOS_M: [f64; 2] = [0.0197, 0.0250];
 pub(super) static STEP_WIDTH_CV: Rule = Rule {
     info: RuleInfo {
         id: "step_width_cv",
+        measures: &["step_width_m", "step_width_sd_m", "usual_speed_mps"],
         version: 1,
         statement: "Step width that varies extremely little (under about 7 %) or much (over about 30 %) goes with falls in \
                     people who walk at 1.0 m/s or faster",
@@ -68,6 +69,7 @@ pub(super) static STEP_WIDTH_CV: Rule = Rule {
 pub(super) static STEP_WIDTH_SD: Rule = Rule {
     info: RuleInfo {
         id: "step_width_sd",
+        measures: &["step_width_sd_m"],
         version: 1,
         statement: "Step width varies by less than 1.97 cm usually; more than 2.50 cm is excessive. It separates old from \
                     young people, not those who fall",
@@ -100,6 +102,7 @@ pub(super) static STEP_WIDTH_SD: Rule = Rule {
 pub(super) static STRIDE_TIME_SD: Rule = Rule {
     info: RuleInfo {
         id: "stride_time_sd",
+        measures: &["stride_time_sd_s"],
         version: 1,
         statement: "Stride time of people who fell varied by 106 +- 30 ms, of others by 49 +- 4 ms; there is no limit",
         unit: Some("s"),

@@ -238,16 +238,20 @@ impl Measures {
         self.entries().into_iter().filter(|(_, measured, _)| measured.is_some()).map(|(name, ..)| name).collect()
     }
 
-    /// Takes each measure that is still missing from an earlier set, and names those that it took.
-    pub fn complete_from(&mut self, mut earlier: Measures) -> Vec<&'static str> {
-        let mut taken = Vec::new();
-        for ((name, own, _), (_, other, _)) in self.entries().into_iter().zip(earlier.entries()) {
-            if own.is_none() && other.is_some() {
-                *own = *other;
-                taken.push(name);
-            }
+    /// The measures that there are, by name.
+    pub fn entered(mut self) -> Vec<(&'static str, Measured)> {
+        self.entries().into_iter().filter_map(|(name, measured, _)| Some((name, (*measured)?))).collect()
+    }
+
+    /// Takes a measure by its name; false when rules know no such measure, or its value cannot be.
+    pub fn take(&mut self, name: &str, measured: Measured) -> bool {
+        let found = self.entries().into_iter().find(|(known, ..)| *known == name);
+        let Some((_, place, possible)) = found else { return false };
+        let is_possible = possible.contains(&measured.value);
+        if is_possible {
+            *place = Some(measured);
         }
-        taken
+        is_possible
     }
 
     /// What cannot be, the name of the measure and a sentence each.

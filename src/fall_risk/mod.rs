@@ -13,6 +13,7 @@ mod five_times_sit_to_stand;
 mod gait_speed;
 mod gait_variability;
 mod known;
+mod minimal_change;
 mod physiological_profile;
 mod quick_screen;
 mod rule;
@@ -24,6 +25,7 @@ mod timed_up_and_go;
 mod world_falls_guidelines;
 
 pub use known::{Answers, Known, Measured, Measures, Person, Sex};
+pub use minimal_change::{CHANGE_RULES, ChangeInfo, change_rule_of};
 pub use rule::{Cutoff, Evidence, Finding, RiskSide, Rule, RuleInfo, Status};
 
 /// Every rule, in the order of a report: whole assessments first, then single tests, then gait.
@@ -44,6 +46,8 @@ pub const RULES: &[&Rule] = &[
     &falls_efficacy::FES_I,
     &gait_speed::SPEED_SLOW_SS,
     &gait_speed::SPEED_SLOW_MAX,
+    &gait_speed::SPEED_RR,
+    &gait_speed::SPEED_NORM,
     &gait_variability::STEP_WIDTH_CV,
     &gait_variability::STEP_WIDTH_SD,
     &gait_variability::STRIDE_TIME_SD,

@@ -10,6 +10,7 @@ const BANDS: [(f64, &str); 4] = [(3.0, "marked"), (2.0, "high"), (1.0, "moderate
 pub(super) static PPA: Rule = Rule {
     info: RuleInfo {
         id: "ppa",
+        measures: &[],
         version: 1,
         statement: "z-score of the Physiological Profile Assessment: 0 to 1 mild, 1 to 2 moderate, 2 to 3 high, 3 and more \
                     marked",

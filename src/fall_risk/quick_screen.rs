@@ -18,6 +18,7 @@ const SIT_TO_STAND: Cutoff = Cutoff::at_least(12.0, Evidence::Unconfirmed);
 pub(super) static QUICKSCREEN: Rule = Rule {
     info: RuleInfo {
         id: "quickscreen",
+        measures: &["near_tandem_hold_s", "alternate_step_s", "five_times_sit_to_stand_s"],
         version: 1,
         statement: "Eight items: a fall in the past year, four or more medicines, a psychotropic one, low-contrast vision, \
                     feeling at the ankle, near tandem stand of 10 s with eyes closed, eight alternate steps in 10 s, five \

@@ -19,6 +19,17 @@ pub enum Evidence {
     Unconfirmed,
 }
 
+impl Evidence {
+    /// The word at the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Evidence::Stated => "stated",
+            Evidence::Quoted => "quoted",
+            Evidence::Unconfirmed => "unconfirmed",
+        }
+    }
+}
+
 /// What a rule says of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -33,6 +44,19 @@ pub enum Status {
     Unknown,
     /// The rule cannot be applied, whatever else were known.
     NotAssessable,
+}
+
+impl Status {
+    /// The word at the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Positive => "positive",
+            Status::Negative => "negative",
+            Status::Indeterminate => "indeterminate",
+            Status::Unknown => "unknown",
+            Status::NotAssessable => "not_assessable",
+        }
+    }
 }
 
 /// On which side of its limit a value is a risk.
@@ -103,6 +127,8 @@ impl Cutoff {
 pub struct RuleInfo {
     /// Identifier; never given to another rule.
     pub id: &'static str,
+    /// Measures that it looks at, by their names.
+    pub measures: &'static [&'static str],
     /// Version of its text and numbers.
     pub version: u32,
     /// What it says, for a clinician.
@@ -154,7 +180,11 @@ pub struct Finding {
     pub rule_id: &'static str,
     /// Its version.
     pub rule_version: u32,
-    /// What it says; null for rules that inform without a limit.
+    /// What the rule says.
+    pub statement: &'static str,
+    /// Measures that the rule looks at, by their names.
+    pub measures: &'static [&'static str],
+    /// What was found; null for rules that inform without a limit.
     pub status: Option<Status>,
     /// Category, points or stage, where the rule has them.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -177,6 +207,8 @@ pub struct Finding {
     pub population_match: Option<bool>,
     /// Probability of the rule's outcome, between what is possible with the unknown items: low, high.
     pub probability: Option<[f64; 2]>,
+    /// Whom the rule was developed on.
+    pub population: &'static str,
     /// Where the rule comes from.
     pub citation: &'static str,
     /// How well the numbers are confirmed.
@@ -193,6 +225,8 @@ impl Finding {
         Self {
             rule_id: info.id,
             rule_version: info.version,
+            statement: info.statement,
+            measures: info.measures,
             status,
             category: None,
             value: None,
@@ -204,6 +238,7 @@ impl Finding {
             n_observations: None,
             population_match: None,
             probability: None,
+            population: info.population,
             citation: info.citation,
             evidence: info.evidence,
             accuracy: info.accuracy,

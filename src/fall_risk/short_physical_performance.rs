@@ -18,6 +18,7 @@ const TANDEM_PART_S: f64 = 3.0;
 pub(super) static SPPB_CHAIR: Rule = Rule {
     info: RuleInfo {
         id: "sppb_chair",
+        measures: &["five_times_sit_to_stand_s"],
         version: 1,
         statement: "Points of five chair stands: up to 11.1 s 4, 13.6 s 3, 16.6 s 2, longer 1, unable 0",
         unit: Some("s"),
@@ -41,6 +42,7 @@ pub(super) static SPPB_CHAIR: Rule = Rule {
 pub(super) static SPPB_GAIT4M: Rule = Rule {
     info: RuleInfo {
         id: "sppb_gait4m",
+        measures: &["walk_4_m_s"],
         version: 1,
         statement: "Points of a walk of four metres: under 4.82 s 4, up to 6.20 s 3, up to 8.70 s 2, longer 1, unable 0",
         unit: Some("s"),
@@ -69,6 +71,7 @@ pub(super) static SPPB_GAIT4M: Rule = Rule {
 pub(super) static SPPB_BALANCE: Rule = Rule {
     info: RuleInfo {
         id: "sppb_balance",
+        measures: &["side_by_side_hold_s", "semi_tandem_hold_s", "tandem_hold_s"],
         version: 1,
         statement: "Points of balance: side by side 10 s 1, also semi-tandem 10 s 2, also tandem 3 to 9 s 3, tandem 10 s 4",
         unit: None,

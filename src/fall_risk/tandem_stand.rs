@@ -6,6 +6,7 @@ use super::rule::{Cutoff, Evidence, Finding, Rule, RuleInfo};
 pub(super) static TANDEM10: Rule = Rule {
     info: RuleInfo {
         id: "tandem10",
+        measures: &["tandem_hold_s"],
         version: 1,
         statement: "A tandem stand of less than 10 s marks a risk",
         unit: Some("s"),

@@ -273,3 +273,17 @@ fn answers_that_contradict_each_other_are_named() {
     assert_eq!(found.len(), 2, "{found:?}");
     assert!(Answers::default().contradictions().is_empty());
 }
+
+#[test]
+fn speed_norm_compares_with_the_mean_of_age_and_sex_and_has_no_status() {
+    let known = |age: f64, speed: f64| {
+        let mut known = Known::default();
+        known.person = Person { age_years: Some(age), sex: Some(Sex::Female), ..Person::default() };
+        known.measures.usual_speed_mps = Some(Measured::of(speed));
+        known
+    };
+    let of = |age, speed| gait_speed::SPEED_NORM.apply(&known(age, speed));
+    assert_eq!(of(80.0, 0.843).reason, "-0.10 m/s against a mean of 0.94 m/s");
+    assert_eq!((of(72.0, 1.2).status, of(72.0, 1.2).evidence), (None, Evidence::Unconfirmed));
+    assert!(of(59.0, 1.2).reason.contains("60 to 99"));
+}

@@ -6,6 +6,7 @@ use super::rule::{Cutoff, Evidence, Finding, Rule, RuleInfo};
 pub(super) static TUG: Rule = Rule {
     info: RuleInfo {
         id: "tug",
+        measures: &["timed_up_and_go_s"],
         version: 1,
         statement: "A timed up and go of more than 15 s marks impaired gait and balance",
         unit: Some("s"),
@@ -22,6 +23,7 @@ pub(super) static TUG: Rule = Rule {
 pub(super) static TUG_MODIFIED: Rule = Rule {
     info: RuleInfo {
         id: "tug_modified",
+        measures: &["timed_up_and_go_s"],
         version: 1,
         statement: "A timed up and go of more than 10 s, in a modified algorithm of the World Falls Guidelines",
         unit: Some("s"),
@@ -38,6 +40,7 @@ pub(super) static TUG_MODIFIED: Rule = Rule {
 pub(super) static TUG_STEADI: Rule = Rule {
     info: RuleInfo {
         id: "tug_steadi",
+        measures: &["timed_up_and_go_s"],
         version: 1,
         statement: "A timed up and go of 12 s or more marks a risk of falling",
         unit: Some("s"),

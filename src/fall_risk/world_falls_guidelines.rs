@@ -13,6 +13,7 @@ const TUG_S: Cutoff = Cutoff::above(15.0, Evidence::Quoted);
 pub(super) static WFG2022: Rule = Rule {
     info: RuleInfo {
         id: "wfg2022",
+        measures: &["usual_speed_mps", "timed_up_and_go_s"],
         version: 1,
         statement: "High: a fall in twelve months with an injury, a second fall, frailty, lying unable to rise or loss of \
                     consciousness. Intermediate: a fall, unsteadiness or worry, and slow walking (0.8 m/s or less) or a \
