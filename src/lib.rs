@@ -21,6 +21,7 @@
 //! | [`synthetic`] | recordings with known truth |
 //! | [`evaluation`] | agreement with a reference |
 //! | [`fall_risk`] | rules with id, unit, citation |
+//! | [`report`] | what a clinician reads |
 //! | [`storage`] | SQLite rows, blobs of bytes |
 //! | [`queue`] | durable jobs |
 //! | [`worker`] | claim, load, assess, save |
@@ -53,6 +54,7 @@ pub mod pipeline;
 pub mod progress;
 pub mod queue;
 pub mod recording;
+pub mod report;
 pub mod signal;
 pub mod storage;
 pub mod synthetic;

@@ -17,6 +17,7 @@ const HOUSE: [&str; 17] = [
     "synthetic",
     "evaluation",
     "fall_risk",
+    "report",
     "storage",
     "queue",
     "worker",

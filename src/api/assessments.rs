@@ -6,7 +6,7 @@ use super::etag::tagged_json;
 use super::page::{DEFAULT_LIMIT, Page, PageLink, id_from_cursor};
 use super::request::{ApiPath, ApiQuery};
 use super::state::AppState;
-use crate::assessment::{ChannelSummary, Gait, Provenance, Quality};
+use crate::assessment::{ChannelSummary, Gait, Performance, Provenance, Quality};
 use crate::storage::{
     AssessmentFilter, AssessmentId, JobId, PageRequest, PatientId, RecordingId, SessionId, StoredAssessment,
 };
@@ -80,6 +80,8 @@ pub struct AssessmentResponse {
     pub summary: Vec<ChannelSummary>,
     /// Steps of a walk; null when the pipeline finds none by its nature.
     pub gait: Option<Gait>,
+    /// How the exercise or test was performed; null in assessments from before it was measured.
+    pub performance: Option<Performance>,
     /// How far the result can be trusted.
     pub quality: Quality,
     /// What is needed to compute the same bytes again.
@@ -111,6 +113,7 @@ impl From<StoredAssessment> for AssessmentResponse {
             channels: stored.channels,
             summary: stored.summary,
             gait: stored.gait,
+            performance: stored.performance,
             quality: stored.quality,
             provenance: stored.provenance,
         }

@@ -8,9 +8,11 @@ pub mod assessments;
 pub mod auth;
 pub mod clients;
 mod docs;
+pub mod entries;
 pub mod error;
 pub mod etag;
-pub mod fall_risk;
+pub mod exports;
+pub mod fhir;
 pub mod health;
 pub mod jobs;
 pub mod metrics;
@@ -20,6 +22,7 @@ mod openapi;
 pub mod page;
 pub mod patients;
 pub mod recordings;
+pub mod report;
 pub mod request;
 pub mod series;
 pub mod sessions;
@@ -82,7 +85,10 @@ fn documented_routes() -> OpenApiRouter<AppState> {
         .merge(assessments::router())
         .merge(series::router())
         .merge(noise_models::router())
-        .merge(fall_risk::router())
+        .merge(entries::router())
+        .merge(report::router())
+        .merge(exports::router())
+        .merge(fhir::router())
         .merge(clients::router())
         .merge(health::router())
         .merge(metrics::router())

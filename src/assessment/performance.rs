@@ -77,6 +77,10 @@ pub struct PerformanceMeasure {
     pub error_sd: Option<f64>,
     /// What it was taken over, for example repetitions, steps or seconds of standing; null when that does not apply.
     pub n_observations: Option<u64>,
+    /// Id of the definition that the value follows, where there are several that give different values; null where there is
+    /// one.
+    #[serde(default)]
+    pub definition: Option<String>,
     /// Why there is no value, or what limits it; empty when nothing does.
     pub reason: String,
 }

@@ -121,12 +121,12 @@ pub fn shoulder_rotation(side: Side, plane: f64, elevation: f64, axial: f64) -> 
 }
 
 /// Humerus frame (ISB: Y towards the shoulder) of a right arm in the T-posture.
-fn t_posture_from_hanging() -> Rotation3<f64> {
+pub fn t_posture_from_hanging() -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Vector3::x_axis(), -FRAC_PI_2)
 }
 
-/// The rotation, mirrored in the sagittal plane for a left limb. Mirroring twice is the identity.
-fn as_right_side(limb: Limb, rotation: &Rotation3<f64>) -> Rotation3<f64> {
+/// The rotation of a limb, mirrored in the sagittal plane for a left one. Mirroring twice is the identity.
+pub fn as_right_side(limb: Limb, rotation: &Rotation3<f64>) -> Rotation3<f64> {
     if limb.side() == Side::Right {
         return *rotation;
     }

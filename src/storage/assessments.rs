@@ -2,12 +2,14 @@
 //! changed.
 
 use super::clock::ms_from_time;
+use super::joint_tracks::{self, EncodedTrack};
+use super::measures;
 use super::series::{self, EncodedSeries};
 use super::{
     Access, AssessmentId, JobId, Page, PageRequest, PatientId, RecordingId, SessionId, StorageError, Store, row,
 };
 use crate::assessment::quality::CalibrationQuality;
-use crate::assessment::{Assessment, ChannelSummary, Gait, Provenance, Quality};
+use crate::assessment::{Assessment, ChannelSummary, Gait, Performance, Provenance, Quality};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
@@ -35,6 +37,8 @@ pub struct StoredAssessment {
     pub summary: Vec<ChannelSummary>,
     /// Steps, when the pipeline finds steps.
     pub gait: Option<Gait>,
+    /// How the exercise or test was performed; none in assessments from before it was measured.
+    pub performance: Option<Performance>,
     /// How far the result can be trusted.
     pub quality: Quality,
     /// What is needed to compute the same bytes again; the settings are in it.
@@ -76,6 +80,7 @@ fn assessment_from_row(row: &SqliteRow) -> Result<StoredAssessment, StorageError
         channels: row::json(row, "channels")?,
         summary: row::json(row, "summary")?,
         gait: row::optional_json(row, "gait")?,
+        performance: row::optional_json(row, "performance")?,
         quality: row::json(row, "quality")?,
         provenance: row::json(row, "provenance")?,
         n_samples: row::count(row, "n_samples")?,
@@ -93,6 +98,8 @@ pub(crate) struct EncodedAssessment {
     channels: String,
     summary: String,
     gait: Option<String>,
+    performance: Option<(String, Performance)>,
+    joints: Option<EncodedTrack>,
     quality: String,
     provenance: String,
     n_samples: i64,
@@ -111,6 +118,8 @@ impl EncodedAssessment {
             channels: row::readable_json("the channel names", &channels)?,
             summary: row::readable_json("the summary", &assessment.summary)?,
             gait: assessment.gait.as_ref().map(|gait| row::readable_json("the gait", gait)).transpose()?,
+            performance: assessment.performance.as_ref().map(with_json).transpose()?,
+            joints: assessment.joints.as_ref().map(EncodedTrack::encode).transpose()?,
             quality: row::readable_json("the quality", &assessment.quality)?,
             provenance: row::readable_json("the provenance", &assessment.provenance)?,
             n_samples: assessment.time_ns.len() as i64,
@@ -121,7 +130,11 @@ impl EncodedAssessment {
     }
 }
 
-/// Inserts an assessment inside the transaction that ends its job.
+fn with_json(performance: &Performance) -> Result<(String, Performance), StorageError> {
+    Ok((row::readable_json("the performance", performance)?, performance.clone()))
+}
+
+/// Inserts an assessment inside the transaction that ends its job, and what it measured of the patient.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     recording_id: RecordingId,
@@ -132,8 +145,8 @@ pub(crate) async fn insert(
     let id = AssessmentId::new();
     sqlx::query(
         "INSERT INTO assessments (id, organisation_id, recording_id, job_id, pipeline, method, channels, summary, quality, provenance,
-                                  n_samples, start_time_ns, end_time_ns, created_at, gait)
-         SELECT ?1, r.organisation_id, r.id, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
+                                  n_samples, start_time_ns, end_time_ns, created_at, gait, performance)
+         SELECT ?1, r.organisation_id, r.id, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15
          FROM recordings r WHERE r.id = ?2",
     )
     .bind(id)
@@ -150,9 +163,16 @@ pub(crate) async fn insert(
     .bind(encoded.end_time_ns)
     .bind(ms_from_time(now))
     .bind(&encoded.gait)
+    .bind(encoded.performance.as_ref().map(|(json, _)| json))
     .execute(&mut *connection)
     .await?;
     series::insert(connection, id, &encoded.series).await?;
+    if let Some(track) = &encoded.joints {
+        joint_tracks::insert(connection, id, track).await?;
+    }
+    if let Some((_, performance)) = &encoded.performance {
+        measures::insert_performance(connection, id, performance, now).await?;
+    }
     Ok(id)
 }
 

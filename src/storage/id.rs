@@ -69,6 +69,10 @@ ids! {
     QuestionnaireId;
     /// Identity of a measurement: results of tests of a patient on one occasion.
     MeasurementId;
+    /// Identity of a measure: one value, by an assessment or of a measurement.
+    MeasureId;
+    /// Identity of a training plan: what a patient is to train at home.
+    TrainingPlanId;
 }
 
 #[cfg(test)]

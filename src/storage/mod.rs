@@ -17,15 +17,18 @@ pub mod assessments;
 pub mod blobs;
 pub mod clients;
 pub mod clock;
+pub mod entries;
 pub mod error;
-pub mod fall_risk;
 pub mod id;
 pub mod idempotency;
+pub mod joint_tracks;
 mod known_keys;
+pub mod measures;
 pub mod noise_models;
 pub mod organisations;
 pub mod page;
 pub mod patients;
+pub mod recent;
 pub mod recordings;
 pub(crate) mod row;
 pub mod series;
@@ -36,13 +39,14 @@ pub use assessments::{AssessmentFilter, StoredAssessment};
 pub use blobs::{BlobReader, BlobStore, BlobWriter, SealedBlob, StoredBlob};
 pub use clients::{ApiKey, Client, Role};
 pub use clock::{Clock, ManualClock, SystemClock};
+pub use entries::{Entry, Occasion};
 pub use error::StorageError;
-pub use fall_risk::{StoredAnswers, StoredMeasures};
 pub use id::{
-    AssessmentId, ClientId, JobId, MeasurementId, NoiseModelId, OrganisationId, PatientId, QuestionnaireId,
-    RecordingId, SessionId,
+    AssessmentId, ClientId, JobId, MeasureId, MeasurementId, NoiseModelId, OrganisationId, PatientId, QuestionnaireId,
+    RecordingId, SessionId, TrainingPlanId,
 };
 pub use idempotency::StoredResponse;
+pub use measures::MeasureFilter;
 pub use noise_models::StoredNoiseModel;
 pub use organisations::Organisation;
 pub use page::{Page, PageRequest};

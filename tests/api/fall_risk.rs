@@ -55,7 +55,8 @@ async fn answers_and_tests_become_findings_and_the_newest_count() {
     let risk = fall_risk(&app, &patient).await;
     assert_eq!(risk["inputs"]["questionnaire"], newest["id"]);
     let used = risk["inputs"]["measures"].as_array().unwrap();
-    assert_eq!((used.len(), &used[0]["measurement"]), (3, &late["id"]));
+    let rises = used.iter().find(|used| used["name"] == "five_times_sit_to_stand_s").unwrap();
+    assert_eq!((used.len(), &rises["source"]["measurement_id"]), (3, &late["id"]));
     let sts5 = finding(&risk, "sts5");
     assert_eq!((&sts5["status"], &sts5["value"]), (&json!("positive"), &json!(15.0)));
     assert_eq!((&sts5["evidence"], &sts5["cutoff"]["value"]), (&json!("unconfirmed"), &json!(12.0)));

@@ -16,6 +16,7 @@ mod patient_calibration;
 mod patients;
 mod problems;
 mod recordings;
+mod report;
 mod series;
 mod serving;
 mod sessions;

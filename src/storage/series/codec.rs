@@ -39,12 +39,12 @@ pub(super) struct SeriesChunk {
 }
 
 /// Codes chunks one after the other with one context.
-pub(super) struct Encoder {
+pub(in crate::storage) struct Encoder {
     zstd: Compressor<'static>,
 }
 
 impl Encoder {
-    pub(super) fn new() -> Result<Self, StorageError> {
+    pub(in crate::storage) fn new() -> Result<Self, StorageError> {
         let mut zstd = Compressor::new(LEVEL).map_err(not_coded)?;
         zstd.set_parameter(CParameter::ChecksumFlag(true)).map_err(not_coded)?;
         Ok(Self { zstd })
@@ -54,16 +54,7 @@ impl Encoder {
         let (Some(&first_ns), Some(&last_ns)) = (time_ns.first(), time_ns.last()) else {
             return Err(StorageError::Corrupt("a chunk without samples".into()));
         };
-        let mut before = 0i64;
-        let differences: Vec<[u8; 8]> = time_ns
-            .iter()
-            .map(|&t| {
-                let difference = t.wrapping_sub(before);
-                before = t;
-                difference.to_le_bytes()
-            })
-            .collect();
-        Ok(TimeChunk { n_samples: time_ns.len(), first_ns, last_ns, bytes: self.compress(&planes(&differences))? })
+        Ok(TimeChunk { n_samples: time_ns.len(), first_ns, last_ns, bytes: self.encode_times(time_ns)? })
     }
 
     pub(super) fn encode_series(&mut self, series: &Series, range: Range<usize>) -> Result<SeriesChunk, StorageError> {
@@ -86,9 +77,29 @@ impl Encoder {
         self.compress(&planes(&words))
     }
 
+    /// Floats of any number, in one piece.
+    pub(in crate::storage) fn encode_floats(&mut self, values: &[f32]) -> Result<Vec<u8>, StorageError> {
+        self.encode_f32(values)
+    }
+
+    /// Times of any number, in one piece: differences.
+    pub(in crate::storage) fn encode_times(&mut self, time_ns: &[i64]) -> Result<Vec<u8>, StorageError> {
+        self.compress(&planes(&differences(time_ns)))
+    }
+
     fn compress(&mut self, bytes: &[u8]) -> Result<Vec<u8>, StorageError> {
         self.zstd.compress(bytes).map_err(not_coded)
     }
+}
+
+fn differences(time_ns: &[i64]) -> Vec<[u8; 8]> {
+    let mut before = 0i64;
+    let difference = |&t: &i64| {
+        let difference = t.wrapping_sub(before);
+        before = t;
+        difference.to_le_bytes()
+    };
+    time_ns.iter().map(difference).collect()
 }
 
 fn planes<const N: usize>(words: &[[u8; N]]) -> Vec<u8> {
@@ -96,18 +107,29 @@ fn planes<const N: usize>(words: &[[u8; N]]) -> Vec<u8> {
 }
 
 /// Decodes chunks one after the other with one set of buffers.
-pub(super) struct Decoder {
+pub(in crate::storage) struct Decoder {
     zstd: Decompressor<'static>,
     bytes: Vec<u8>,
+    most_values: usize,
 }
 
 impl Decoder {
-    pub(super) fn new() -> Result<Self, StorageError> {
-        Ok(Self { zstd: Decompressor::new().map_err(damaged)?, bytes: Vec::new() })
+    pub(in crate::storage) fn new() -> Result<Self, StorageError> {
+        Self::of_pieces(super::CHUNK_SAMPLES)
+    }
+
+    /// A decoder of pieces of at most so many values.
+    pub(in crate::storage) fn of_pieces(most_values: usize) -> Result<Self, StorageError> {
+        Ok(Self { zstd: Decompressor::new().map_err(damaged)?, bytes: Vec::new(), most_values })
     }
 
     /// Appends `n` floats.
-    pub(super) fn decode_f32(&mut self, chunk: &[u8], n: usize, into: &mut Vec<f32>) -> Result<(), StorageError> {
+    pub(in crate::storage) fn decode_f32(
+        &mut self,
+        chunk: &[u8],
+        n: usize,
+        into: &mut Vec<f32>,
+    ) -> Result<(), StorageError> {
         let bytes = self.decompress(chunk, n, 4)?;
         let (first, rest) = bytes.split_at(n);
         let (second, rest) = rest.split_at(n);
@@ -124,7 +146,12 @@ impl Decoder {
     }
 
     /// Appends `n` times.
-    pub(super) fn decode_time(&mut self, chunk: &[u8], n: usize, into: &mut Vec<i64>) -> Result<(), StorageError> {
+    pub(in crate::storage) fn decode_time(
+        &mut self,
+        chunk: &[u8],
+        n: usize,
+        into: &mut Vec<i64>,
+    ) -> Result<(), StorageError> {
         let bytes = self.decompress(chunk, n, 8)?;
         let mut time = 0i64;
         into.extend((0..n).map(|i| {
@@ -135,10 +162,10 @@ impl Decoder {
     }
 
     fn decompress(&mut self, chunk: &[u8], n: usize, width: usize) -> Result<&[u8], StorageError> {
-        if n > super::CHUNK_SAMPLES {
-            return Err(StorageError::Corrupt(format!("a chunk of {n} samples")));
+        if n > self.most_values {
+            return Err(StorageError::Corrupt(format!("a chunk of {n} values")));
         }
-        self.bytes.resize(super::CHUNK_SAMPLES * 8, 0);
+        self.bytes.resize(self.bytes.len().max(n * width), 0);
         let found = self.zstd.decompress_to_buffer(chunk, &mut self.bytes[..n * width]).map_err(damaged)?;
         if found != n * width {
             return Err(StorageError::Corrupt(format!("a chunk of {found} bytes where {} belong", n * width)));

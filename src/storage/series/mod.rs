@@ -4,7 +4,7 @@
 //! `codec`). A read of a time range decodes only the chunks that it touches, and of those only the parts that were
 //! asked for; one question to the database brings all channels.
 
-mod codec;
+pub(super) mod codec;
 mod decimation;
 
 use super::{Access, AssessmentId, StorageError, Store};
