@@ -65,14 +65,16 @@ impl Series {
     /// Summary over the samples that are observed.
     pub fn summarize(&self) -> ChannelSummary {
         const UNSEEN: u8 = FLAG_BRIDGED | FLAG_NOT_OBSERVABLE;
-        let observed = || {
-            let samples = self.value.iter().zip(&self.flags);
-            samples.filter(|(v, f)| v.is_finite() && *f & UNSEEN == 0).map(|(v, _)| f64::from(*v))
-        };
-        let count = observed().count();
+        let samples = self.value.iter().zip(&self.flags);
+        let observed = samples.filter(|(v, f)| v.is_finite() && *f & UNSEEN == 0).map(|(v, _)| f64::from(*v));
+        let (mut count, mut sum, mut min, mut max) = (0u64, 0.0, f64::INFINITY, f64::NEG_INFINITY);
+        for value in observed {
+            count += 1;
+            sum += value;
+            min = min.min(value);
+            max = max.max(value);
+        }
         let when_any = |number: f64| (count > 0).then_some(number);
-        let min = observed().fold(f64::INFINITY, f64::min);
-        let max = observed().fold(f64::NEG_INFINITY, f64::max);
         let mut widths: Vec<f32> =
             self.low.iter().zip(&self.high).map(|(l, h)| h - l).filter(|w| w.is_finite()).collect();
         let middle = widths.len() / 2;
@@ -83,7 +85,7 @@ impl Series {
             min: when_any(min),
             max: when_any(max),
             range: when_any(max - min),
-            mean: when_any(observed().sum::<f64>() / count.max(1) as f64),
+            mean: when_any(sum / count.max(1) as f64),
             interval_width: median.map(f64::from),
         }
     }
