@@ -77,6 +77,9 @@ pub struct PerformanceMeasure {
     pub error_sd: Option<f64>,
     /// What it was taken over, for example repetitions, steps or seconds of standing; null when that does not apply.
     pub n_observations: Option<u64>,
+    /// Id of the definition, for measures that have several which are not comparable, for example step width.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definition: Option<String>,
     /// Why there is no value, or what limits it; empty when nothing does.
     pub reason: String,
 }
