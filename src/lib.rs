@@ -17,6 +17,7 @@
 //! | [`body`] | the human body as a model |
 //! | [`recording`] | what a client uploads, decoded |
 //! | [`assessment`] | what one pipeline found |
+//! | [`gait`] | footfalls → gait measures |
 //! | [`pipeline`] | recording → assessment, pure |
 //! | [`synthetic`] | recordings with known truth |
 //! | [`evaluation`] | agreement with a reference |
@@ -49,6 +50,7 @@ pub mod config;
 pub mod estimation;
 pub mod evaluation;
 pub mod fall_risk;
+pub mod gait;
 pub mod geometry;
 pub mod pipeline;
 pub mod progress;

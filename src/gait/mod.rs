@@ -1,0 +1,112 @@
+//! Footfalls and what they tell of gait: lengths, times, variability, symmetry, phases.
+//!
+//! Contacts come from joints of a camera that stands ([`measures_of_track`]) or from the depth pipeline, whose camera goes
+//! along ([`measures_of_steps`]); definitions, exclusions and limits are those of the clinical evidence, sections 5 and 6.
+//! `contact` says which steps count, `steps` what one step is, `summary` what all of them are; `track` finds contacts in a
+//! track. A value is missing, with its reason, rather than invented.
+
+pub mod contact;
+mod depth;
+pub mod plausibility;
+mod spread;
+pub mod steps;
+pub mod summary;
+mod track;
+
+pub use contact::{GaitContact, StepExclusion, StepExclusionCount};
+pub use plausibility::GaitFlag;
+pub use spread::corrected_sd;
+pub use summary::{HEEL_TO_OPPOSITE_LINE, PlaceDefinition, StepSelection};
+
+use crate::assessment::gait::FLAT_FOOTPRINTS;
+use crate::assessment::{Gait, JointTrack, PerformanceMeasure};
+use serde::{Deserialize, Serialize};
+use track::Stepping;
+use utoipa::ToSchema;
+
+/// What footfalls tell of gait.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct GaitFindings {
+    /// Measures over the steps that count.
+    pub measures: Vec<PerformanceMeasure>,
+    /// The same over every step, also those that are left out: the first and last of a walk, and turns. A short walk has no
+    /// other; the rules of fall risk do not take them.
+    pub measures_of_all_steps: Vec<PerformanceMeasure>,
+    /// Every contact, by time.
+    pub contacts: Vec<GaitContact>,
+    /// Steps that were left out, by reason.
+    pub exclusions: Vec<StepExclusionCount>,
+    /// Measures outside their plausible limits; they are kept.
+    pub flags: Vec<GaitFlag>,
+    /// Why nothing, or not everything, was found; empty when everything was.
+    pub reason: String,
+}
+
+/// Gait from where joints were before a camera that stands. Nothing for a movement that is no walking; times alone for
+/// steps on the spot.
+pub fn measures_of_track(track: &JointTrack) -> GaitFindings {
+    let footfalls = track::footfalls(track);
+    let reason = match footfalls.kind {
+        Stepping::Walking if footfalls.has_backward => "walks that go backwards are left out",
+        Stepping::Walking => "",
+        Stepping::OnTheSpot => "the steps are on the spot: they have times, but no lengths, widths or speed",
+        Stepping::None if footfalls.has_backward => "the walk goes backwards, which is not measured",
+        Stepping::None => "there is no walking in the recording",
+        Stepping::NoLegs => "the recording lacks pelvis or feet",
+    };
+    let id = (footfalls.kind == Stepping::Walking).then_some(FLAT_FOOTPRINTS);
+    findings(footfalls.contacts, &PlaceDefinition { id, error_sd_m: None }, reason)
+}
+
+/// Measures of contacts whose places were measured by a definition; exclusions are marked here.
+pub fn findings(mut contacts: Vec<GaitContact>, places: &PlaceDefinition, reason: &str) -> GaitFindings {
+    contact::mark_excluded(&mut contacts);
+    let all = match contacts.is_empty() {
+        true => Vec::new(),
+        false => summary::measures(&contacts, places, StepSelection::All),
+    };
+    let counted = match contacts.is_empty() {
+        true => Vec::new(),
+        false => summary::measures(&contacts, places, StepSelection::Counted),
+    };
+    assembled(counted, all, contacts, reason)
+}
+
+/// Gait from the steps of the depth pipeline.
+pub fn measures_of_steps(gait: &Gait) -> GaitFindings {
+    let contacts = depth::contacts(gait);
+    if contacts.is_empty() {
+        return GaitFindings { reason: "there are no steps in the recording".to_owned(), ..GaitFindings::default() };
+    }
+    let places = PlaceDefinition::default();
+    let of = |selection: StepSelection| {
+        let mut measures = depth::lengths(gait, selection == StepSelection::All);
+        measures.extend(summary::measures(&contacts, &places, selection));
+        measures
+    };
+    let (counted, all) = (of(StepSelection::Counted), of(StepSelection::All));
+    assembled(counted, all, contacts, "")
+}
+
+fn assembled(
+    measures: Vec<PerformanceMeasure>,
+    measures_of_all_steps: Vec<PerformanceMeasure>,
+    contacts: Vec<GaitContact>,
+    reason: &str,
+) -> GaitFindings {
+    let mut reason = reason.to_owned();
+    let has_none = measures.iter().all(|measure| measure.value.is_none());
+    if reason.is_empty() && has_none {
+        reason = "no step is left after the first and last two of each walk, turns, and steps that were hardly seen; record \
+                  a longer walk"
+            .to_owned();
+    }
+    GaitFindings {
+        flags: plausibility::flags(&measures),
+        exclusions: contact::count_excluded(&contacts),
+        measures,
+        measures_of_all_steps,
+        contacts,
+        reason,
+    }
+}

@@ -1,0 +1,132 @@
+//! Footfalls from where joints were: whether there is walking, and each contact of a foot.
+//!
+//! `legs` puts pelvis and feet on a fine grid, `walking` finds the contacts of somebody whose body goes on, `marching` of
+//! somebody who steps on the spot. What is neither has no footfalls.
+
+mod legs;
+mod marching;
+mod walking;
+
+use super::contact::GaitContact;
+use super::plausibility::SHORTEST_STRIDE_M;
+use crate::assessment::JointTrack;
+use legs::Legs;
+use nalgebra::{Vector2, Vector3};
+use walking::WalkContact;
+
+/// Fewest contacts that are a walk: one stride, both of whose steps were seen.
+const FEWEST_CONTACTS: usize = 3;
+/// A stride that points this far aside from the one before belongs to a turn, radians; strides of a straight walk stay
+/// within a few degrees.
+const TURN: f64 = 15.0 * std::f64::consts::PI / 180.0;
+
+/// What was found in a track.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Footfalls {
+    /// Contacts by time; none when there is no stepping.
+    pub contacts: Vec<GaitContact>,
+    /// What was done.
+    pub kind: Stepping,
+    /// Whether a walk was left out because somebody went backwards.
+    pub has_backward: bool,
+}
+
+/// How somebody steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stepping {
+    /// From place to place.
+    Walking,
+    /// On the spot.
+    OnTheSpot,
+    /// Not at all.
+    None,
+    /// The joints of the legs are not in the track.
+    NoLegs,
+}
+
+/// The footfalls of a track.
+pub(super) fn footfalls(track: &JointTrack) -> Footfalls {
+    let mut found = Footfalls { contacts: Vec::new(), kind: Stepping::NoLegs, has_backward: false };
+    let Some(legs) = Legs::of(track) else { return found };
+    found.kind = Stepping::None;
+    let walks: Vec<Vec<WalkContact>> = walking::walks(&legs).into_iter().filter(|walk| is_walk(walk)).collect();
+    let (backward, forward): (Vec<_>, Vec<_>) = walks.into_iter().partition(|walk| is_backward(&legs, walk));
+    found.has_backward = !backward.is_empty();
+    if !forward.is_empty() {
+        found.kind = Stepping::Walking;
+        for (number, walk) in forward.iter().enumerate() {
+            found.contacts.extend(contacts_of_walk(&legs, walk, number as u64));
+        }
+        return found;
+    }
+    if found.has_backward {
+        return found;
+    }
+    for (number, run) in marching::runs(&legs).iter().enumerate() {
+        found.kind = Stepping::OnTheSpot;
+        for (i, contact) in run.iter().enumerate() {
+            let contact_s = legs.time_s(contact.node);
+            let before_s = i.checked_sub(1).map_or(contact_s, |i| legs.time_s(run[i].node));
+            found.contacts.push(GaitContact {
+                place_m: None,
+                walk: number as u64,
+                toe_off_s: contact.toe_off.map(|node| legs.time_s(node)),
+                coverage: if i > 0 { legs.coverage(before_s, contact_s) } else { 1.0 },
+                ..GaitContact::new(contact.side, contact_s, [0.0; 2])
+            });
+        }
+    }
+    found
+}
+
+/// True of contacts whose strides go somewhere.
+fn is_walk(walk: &[WalkContact]) -> bool {
+    if walk.len() < FEWEST_CONTACTS {
+        return false;
+    }
+    let mut strides: Vec<f64> = (2..walk.len()).filter_map(|i| Some(stride(walk, i)?.dot(&walk[i].direction))).collect();
+    strides.sort_unstable_by(f64::total_cmp);
+    strides.get(strides.len() / 2).is_some_and(|stride| *stride >= SHORTEST_STRIDE_M)
+}
+
+/// The stride that ends with contact `i`.
+fn stride(walk: &[WalkContact], i: usize) -> Option<Vector3<f64>> {
+    let before = walk.get(i.checked_sub(2)?)?;
+    if before.side != walk[i].side {
+        return None;
+    }
+    Some(walk[i].place? - before.place?)
+}
+
+/// True of a walk in which the hips face away from where they go.
+fn is_backward(legs: &Legs, walk: &[WalkContact]) -> bool {
+    let facing = walk.iter().filter_map(|contact| {
+        let right = legs.right[(contact.node.round() as usize).min(legs.grid.len - 1)]?;
+        Some(Vector3::y().cross(&right).normalize().dot(&contact.direction))
+    });
+    facing.sum::<f64>() < 0.0
+}
+
+fn contacts_of_walk(legs: &Legs, walk: &[WalkContact], number: u64) -> Vec<GaitContact> {
+    let heading = |i: usize| {
+        let way = stride(walk, i).unwrap_or(walk[i].direction);
+        Vector2::new(way.x, way.z)
+    };
+    let turns = |i: usize, k: usize| heading(i).angle(&heading(k)) > TURN;
+    (0..walk.len())
+        .map(|i| {
+            let contact_s = legs.time_s(walk[i].node);
+            let before_s = i.checked_sub(1).map(|i| legs.time_s(walk[i].node));
+            // A stride's heading says something of both of its steps.
+            let is_turning = (i >= 3 && turns(i, i - 1)) || (i >= 2 && i + 1 < walk.len() && turns(i + 1, i));
+            GaitContact {
+                toe_off_s: walk[i].toe_off.map(|node| legs.time_s(node)),
+                place_m: walk[i].place.map(|place| [place.x, place.z]),
+                walk: number,
+                coverage: before_s.map_or(1.0, |before_s| legs.coverage(before_s, contact_s)),
+                is_turning,
+                ..GaitContact::new(walk[i].side, contact_s, [0.0; 2])
+            }
+        })
+        .collect()
+}
