@@ -163,7 +163,8 @@ impl Spread {
         share.error_sd = self.error_sd.zip(mean).map(|(sd, mean)| 100.0 * sd / mean.abs());
         found.push(share);
         if let Some((value, error)) = sd.zip(self.error_sd) {
-            let mut corrected = self.measure(format!("{stem}_sd_corrected_{unit}"), None, Some(corrected_sd(value, error)), id);
+            let mut corrected =
+                self.measure(format!("{stem}_sd_corrected_{unit}"), None, Some(corrected_sd(value, error)), id);
             corrected.error_sd = Some(error);
             found.push(corrected);
         }
@@ -206,7 +207,8 @@ mod tests {
     use super::*;
 
     fn spread(left: &[f64], right: &[f64]) -> Spread {
-        let of = |side: Side, values: &[f64]| values.iter().map(|&value| Observation { side, value }).collect::<Vec<_>>();
+        let of =
+            |side: Side, values: &[f64]| values.iter().map(|&value| Observation { side, value }).collect::<Vec<_>>();
         Spread::of([of(Side::Left, left), of(Side::Right, right)].concat(), Some(0.005))
     }
 

@@ -34,7 +34,11 @@ pub enum StepSelection {
 }
 
 /// The measures of contacts in order of time, as their exclusions are marked.
-pub fn measures(contacts: &[GaitContact], places: &PlaceDefinition, selection: StepSelection) -> Vec<PerformanceMeasure> {
+pub fn measures(
+    contacts: &[GaitContact],
+    places: &PlaceDefinition,
+    selection: StepSelection,
+) -> Vec<PerformanceMeasure> {
     let all = steps(contacts);
     let is_all = selection == StepSelection::All;
     let counted: Vec<&StepValues> = all.iter().filter(|s| is_all || s.counts).collect();
@@ -71,7 +75,8 @@ fn observation(step: &StepValues, value: Option<f64>) -> Option<Observation> {
 /// Shares and times of stance, swing and support.
 fn phases(strides: &[&StepValues]) -> Vec<PerformanceMeasure> {
     let of = |value: &dyn Fn(&StridePhases, f64) -> f64| {
-        let value = |s: &&&StepValues| observation(s, s.phases.zip(s.stride_time_s).map(|(p, stride)| value(&p, stride)));
+        let value =
+            |s: &&&StepValues| observation(s, s.phases.zip(s.stride_time_s).map(|(p, stride)| value(&p, stride)));
         Spread::of(strides.iter().filter_map(|s| value(&s)).collect(), None)
     };
     let mut found = Vec::new();
@@ -106,7 +111,9 @@ fn phases(strides: &[&StepValues]) -> Vec<PerformanceMeasure> {
 fn rates(contacts: &[GaitContact], counted: &[&StepValues], id: &Option<String>) -> Vec<PerformanceMeasure> {
     let (mut n_steps, mut time_s) = (0u64, 0.0);
     let (mut way_m, mut way_time_s, mut n_way) = (0.0, 0.0, 0u64);
-    for run in counted.chunk_by(|a, b| b.contact == a.contact + 1 && contacts[a.contact].walk == contacts[b.contact].walk) {
+    for run in
+        counted.chunk_by(|a, b| b.contact == a.contact + 1 && contacts[a.contact].walk == contacts[b.contact].walk)
+    {
         let (first, last) = (run[0].contact - 1, run[run.len() - 1].contact);
         n_steps += run.len() as u64;
         time_s += contacts[last].contact_s - contacts[first].contact_s;
@@ -139,7 +146,8 @@ fn rates(contacts: &[GaitContact], counted: &[&StepValues], id: &Option<String>)
 
 /// Standard error of a speed from the speeds of single strides, SD / √n; none with fewer than two.
 fn speed_error(counted: &[&StepValues]) -> Option<f64> {
-    let of_stride = |s: &&StepValues| observation(s, s.stride_length_m.zip(s.stride_time_s).map(|(way, time)| way / time));
+    let of_stride =
+        |s: &&StepValues| observation(s, s.stride_length_m.zip(s.stride_time_s).map(|(way, time)| way / time));
     Spread::of(counted.iter().filter_map(of_stride).collect(), None).standard_error()
 }
 
@@ -167,7 +175,8 @@ mod tests {
     use super::*;
     use crate::gait::contact::{GaitContact, mark_excluded};
 
-    const HEELS: PlaceDefinition = PlaceDefinition { id: Some(HEEL_TO_OPPOSITE_LINE), error_sd_m: None, offset_sd_m: None };
+    const HEELS: PlaceDefinition =
+        PlaceDefinition { id: Some(HEEL_TO_OPPOSITE_LINE), error_sd_m: None, offset_sd_m: None };
 
     fn walk(n: usize) -> Vec<GaitContact> {
         let at = |i: usize| {

@@ -93,8 +93,7 @@ pub fn compare(found: &[GaitContact], truth: &[TrueContact]) -> Option<GaitError
     let (own, twins): (Vec<GaitContact>, Vec<GaitContact>) = pairs.into_iter().unzip();
     let steps = [&own, &twins].map(|contacts| steps(contacts));
     let step_pairs = || steps[0].iter().zip(&steps[1]);
-    let lengths: Vec<f64> =
-        step_pairs().filter_map(|(a, b)| Some((a.length_m? - b.length_m?).abs())).collect();
+    let lengths: Vec<f64> = step_pairs().filter_map(|(a, b)| Some((a.length_m? - b.length_m?).abs())).collect();
     let scatter = |value: fn(&StepValues) -> Option<f64>| {
         let errors = |side: Side| -> Vec<f64> {
             step_pairs().filter(|(a, _)| a.side == side).filter_map(|(a, b)| Some(value(a)? - value(b)?)).collect()

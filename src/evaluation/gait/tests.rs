@@ -45,7 +45,8 @@ fn exercises_have_no_footfalls_and_steps_on_the_spot_no_lengths() {
         for source in sources {
             let Some(skeleton) = source.read().unwrap().recording.skeleton else { continue };
             let found = measures_of_track(&JointTrack::of_skeleton(&skeleton));
-            let lengths = found.measures_of_all_steps.iter().filter(|m| m.name.ends_with("_m") || m.name.ends_with("_mps"));
+            let lengths =
+                found.measures_of_all_steps.iter().filter(|m| m.name.ends_with("_m") || m.name.ends_with("_mps"));
             assert_eq!(lengths.count(), 0, "{}", source.name);
             let is_on_the_spot = source.exercise.contains("in_place");
             assert!(is_on_the_spot || found.contacts.is_empty(), "{} {}", source.name, source.exercise);

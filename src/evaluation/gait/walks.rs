@@ -46,8 +46,7 @@ pub fn captured(motion: &SkeletonRecording, seeds: u64) -> Vec<GaitWalk> {
     for seed in 1..=seeds {
         for direction in 0..DIRECTIONS {
             let first = (seed as usize + direction) % CAPTURED_STRIDE;
-            let mut walk =
-                of(thinned(motion, CAPTURED_STRIDE, first), direction as f64 * FRAC_PI_2, "kinect");
+            let mut walk = of(thinned(motion, CAPTURED_STRIDE, first), direction as f64 * FRAC_PI_2, "kinect");
             add_kinect_error(&mut walk.skeleton, seed);
             walks.push(walk);
         }

@@ -54,7 +54,9 @@ impl Legs {
         let both = |left, right| Some([samples(left)?, samples(right)?]);
         let hips = both(Joint::LeftHip, Joint::RightHip);
         let pelvis = match &hips {
-            Some([left, right]) => left.iter().zip(right).map(|(l, r)| Some((l.as_ref()? + r.as_ref()?) * 0.5)).collect(),
+            Some([left, right]) => {
+                left.iter().zip(right).map(|(l, r)| Some((l.as_ref()? + r.as_ref()?) * 0.5)).collect()
+            }
             None => samples(Joint::Pelvis)?,
         };
         let toes = both(Joint::LeftFoot, Joint::RightFoot);

@@ -124,7 +124,8 @@ fn is_walk(walk: &[WalkContact]) -> bool {
     if walk.len() < FEWEST_CONTACTS {
         return false;
     }
-    let mut strides: Vec<f64> = (2..walk.len()).filter_map(|i| Some(stride(walk, i)?.dot(&walk[i].direction))).collect();
+    let mut strides: Vec<f64> =
+        (2..walk.len()).filter_map(|i| Some(stride(walk, i)?.dot(&walk[i].direction))).collect();
     strides.sort_unstable_by(f64::total_cmp);
     strides.get(strides.len() / 2).is_some_and(|stride| *stride >= SHORTEST_STRIDE_M)
 }

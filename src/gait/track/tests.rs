@@ -31,14 +31,8 @@ fn track(seconds: f64, at: impl Fn(f64) -> [Vector3<f64>; 6], turn: f64) -> Join
     let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn);
     let n = (seconds * 30.0) as usize;
     let time_ns: Vec<i64> = (0..n as i64).map(|t| 5_000_000_000 + t * FRAME_NS).collect();
-    let joints = vec![
-        Joint::LeftHip,
-        Joint::RightHip,
-        Joint::LeftAnkle,
-        Joint::RightAnkle,
-        Joint::LeftFoot,
-        Joint::RightFoot,
-    ];
+    let joints =
+        vec![Joint::LeftHip, Joint::RightHip, Joint::LeftAnkle, Joint::RightAnkle, Joint::LeftFoot, Joint::RightFoot];
     let positions_m = (0..n)
         .flat_map(|t| at(t as f64 * FRAME_NS as f64 * 1e-9))
         .map(|point| (turn * point).map(|value| value as f32).into())
