@@ -5,6 +5,7 @@ pub mod contender;
 pub mod error_analysis;
 pub mod figures;
 pub mod fusion;
+pub mod gait;
 pub mod hinge;
 pub mod joint_angles;
 pub mod orientation;

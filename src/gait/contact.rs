@@ -13,8 +13,8 @@ pub struct GaitContact {
     pub contact_s: f64,
     /// The terminal contact before it: when this foot had left the floor to come here; null when that was not seen.
     pub toe_off_s: Option<f64>,
-    /// Where it stood on the floor: `x` and `z` of the recording's `world`, metres; null when that was not seen, or when
-    /// the sensor moved.
+    /// Where it stood on the floor: `x` and `z` of the recording's `world`, turned so that the floor is level, metres; null
+    /// when that was not seen, or when the sensor moved.
     pub place_m: Option<[f64; 2]>,
     /// The walk that it belongs to, from 0: a walk ends where somebody stands, turns back or was not seen.
     pub walk: u64,

@@ -9,8 +9,8 @@
 
 use super::contact::{GaitContact, StepExclusion};
 use super::spread::{Observation, Spread};
-use crate::assessment::gait::{ANKLES_AT_MID_DOUBLE_SUPPORT, FLAT_FOOTPRINTS, Gait, Step, StepMeasure};
 use crate::assessment::PerformanceMeasure;
+use crate::assessment::gait::{ANKLES_AT_MID_DOUBLE_SUPPORT, FLAT_FOOTPRINTS, Gait, Step, StepMeasure};
 
 /// Half a 95 % interval in standard deviations.
 const NORMAL_975: f64 = 1.96;

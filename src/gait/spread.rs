@@ -12,18 +12,37 @@ pub(super) struct Observation {
     pub value: f64,
 }
 
+/// An error of a sensor that is the same in every step, as a standard deviation over sensors.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) enum ConstantError {
+    /// Nothing is known of one.
+    #[default]
+    None,
+    /// It adds to one foot what it takes from the other: the mean of both is free of it.
+    Opposed(f64),
+    /// It adds to every value.
+    Shared(f64),
+}
+
 /// Values of both feet, and what is known of their error.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spread {
     observations: Vec<Observation>,
     /// Standard deviation of the error of one value; none when not known.
     error_sd: Option<f64>,
+    /// What no number of steps averages out.
+    constant: ConstantError,
 }
 
 impl Spread {
     /// The spread of observations.
     pub(super) fn of(observations: Vec<Observation>, error_sd: Option<f64>) -> Self {
-        Self { observations, error_sd }
+        Self { observations, error_sd, constant: ConstantError::None }
+    }
+
+    /// The same with an error that no number of steps averages out.
+    pub(super) fn with_constant(self, constant: ConstantError) -> Self {
+        Self { constant, ..self }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -67,6 +86,27 @@ impl Spread {
         self.sd().map(|sd| sd / (self.observations.len() as f64).sqrt())
     }
 
+    /// Standard error of the ratio right / left, to first order.
+    fn ratio_error(&self) -> Option<f64> {
+        let of_side = |side: Side| {
+            let values = self.values(side);
+            Some((mean(&values)?, deviation(&values)? / (values.len() as f64).sqrt()))
+        };
+        let ((left, left_error), (right, right_error)) = (of_side(Side::Left)?, of_side(Side::Right)?);
+        if left <= 0.0 {
+            return None;
+        }
+        let ratio = right / left;
+        let random = right_error.hypot(ratio * left_error) / left;
+        let constant = match self.constant {
+            ConstantError::None => 0.0,
+            // What one foot gains the other loses.
+            ConstantError::Opposed(sd) => (1.0 + ratio) * sd / left,
+            ConstantError::Shared(sd) => (1.0 - ratio).abs() * sd / left,
+        };
+        Some(random.hypot(constant))
+    }
+
     fn measure(&self, name: String, side: Option<Side>, value: Option<f64>, id: &Option<String>) -> PerformanceMeasure {
         let n = side.map_or(self.observations.len(), |side| self.values(side).len());
         let reason = match value {
@@ -88,12 +128,17 @@ impl Spread {
     /// The mean of both feet and of each.
     pub(super) fn means(&self, name: &str, id: &Option<String>) -> Vec<PerformanceMeasure> {
         let mut both = self.measure(name.to_owned(), None, self.mean(), id);
-        both.standard_error = self.standard_error();
+        let (of_both, of_one) = match self.constant {
+            ConstantError::None => (0.0, 0.0),
+            ConstantError::Opposed(sd) => (0.0, sd),
+            ConstantError::Shared(sd) => (sd, sd),
+        };
+        both.standard_error = self.standard_error().map(|error| error.hypot(of_both));
         let mut found = vec![both];
         for side in Side::BOTH {
             let values = self.values(side);
             let mut one = self.measure(name.to_owned(), Some(side), mean(&values), id);
-            one.standard_error = deviation(&values).map(|sd| sd / (values.len() as f64).sqrt());
+            one.standard_error = deviation(&values).map(|sd| (sd / (values.len() as f64).sqrt()).hypot(of_one));
             found.push(one);
         }
         found
@@ -118,7 +163,8 @@ impl Spread {
         share.error_sd = self.error_sd.zip(mean).map(|(sd, mean)| 100.0 * sd / mean.abs());
         found.push(share);
         if let Some((value, error)) = sd.zip(self.error_sd) {
-            let mut corrected = self.measure(format!("{stem}_sd_corrected_{unit}"), None, Some(corrected_sd(value, error)), id);
+            let mut corrected =
+                self.measure(format!("{stem}_sd_corrected_{unit}"), None, Some(corrected_sd(value, error)), id);
             corrected.error_sd = Some(error);
             found.push(corrected);
         }
@@ -133,7 +179,9 @@ impl Spread {
             [Some(left), Some(right)] if left > 0.0 => Some(right / left),
             _ => None,
         };
-        found.push(self.measure(format!("{stem}_symmetry_ratio"), None, ratio, id));
+        let mut symmetry = self.measure(format!("{stem}_symmetry_ratio"), None, ratio, id);
+        symmetry.standard_error = self.ratio_error();
+        found.push(symmetry);
         found
     }
 }
@@ -159,7 +207,8 @@ mod tests {
     use super::*;
 
     fn spread(left: &[f64], right: &[f64]) -> Spread {
-        let of = |side: Side, values: &[f64]| values.iter().map(|&value| Observation { side, value }).collect::<Vec<_>>();
+        let of =
+            |side: Side, values: &[f64]| values.iter().map(|&value| Observation { side, value }).collect::<Vec<_>>();
         Spread::of([of(Side::Left, left), of(Side::Right, right)].concat(), Some(0.005))
     }
 
@@ -190,6 +239,20 @@ mod tests {
         let sd = found.iter().find(|m| m.name == "step_length_sd_m").unwrap();
         assert_eq!((sd.value, sd.reason.as_str(), sd.error_sd), (None, "too few steps count", Some(0.005)));
         assert!(found.iter().all(|m| m.name != "step_length_sd_corrected_m"));
+    }
+
+    #[test]
+    fn a_constant_error_between_the_feet_widens_sides_and_symmetry_but_not_the_mean_of_both() {
+        let plain = spread(&[0.50, 0.52, 0.54], &[0.60, 0.62, 0.64]);
+        let error = |measures: &[PerformanceMeasure], k: usize| measures[k].standard_error.unwrap();
+        let (before, after) =
+            (plain.all("a_m", &None), plain.clone().with_constant(ConstantError::Opposed(0.04)).all("a_m", &None));
+        assert_eq!(error(&before, 0), error(&after, 0));
+        assert!((error(&after, 1) - error(&before, 1).hypot(0.04)).abs() < 1e-12);
+        let ratio = |measures: &[PerformanceMeasure]| error(measures, measures.len() - 1);
+        assert!(ratio(&before) < 0.05 && ratio(&after) > 0.15, "{} {}", ratio(&before), ratio(&after));
+        let shared = plain.with_constant(ConstantError::Shared(0.04)).means("a_m", &None);
+        assert!((error(&shared, 0) - error(&before, 0).hypot(0.04)).abs() < 1e-12);
     }
 
     #[test]

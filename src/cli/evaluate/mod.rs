@@ -2,6 +2,7 @@
 
 mod document;
 mod fusion;
+mod gait;
 mod hinge;
 mod noise;
 mod orientation;
@@ -40,6 +41,8 @@ enum What {
     JointAngles(JointAngleArgs),
     /// Camera skeleton and inertial units fused, simulated and real
     Fusion(fusion::FusionArgs),
+    /// Gait measures from camera skeletons against captured and simulated walks
+    Gait(gait::GaitArgs),
     /// Flexion of hinge joints from two inertial units against optical angles
     Hinge(hinge::HingeArgs),
     /// Orientation filters of inertial units against optical orientation
@@ -118,6 +121,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.what {
         What::JointAngles(args) => joint_angles(args, &mut std::io::stdout().lock()),
         What::Fusion(args) => fusion::run(args, &mut std::io::stdout().lock()),
+        What::Gait(args) => gait::run(args, &mut std::io::stdout().lock()),
         What::Hinge(args) => hinge::run(args, &mut std::io::stdout().lock()),
         What::Orientation(args) => orientation::run(args, &mut std::io::stdout().lock()),
         What::Walker(args) => walker::run(args, &mut std::io::stdout().lock()),

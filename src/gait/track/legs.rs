@@ -54,7 +54,9 @@ impl Legs {
         let both = |left, right| Some([samples(left)?, samples(right)?]);
         let hips = both(Joint::LeftHip, Joint::RightHip);
         let pelvis = match &hips {
-            Some([left, right]) => left.iter().zip(right).map(|(l, r)| Some((l.as_ref()? + r.as_ref()?) * 0.5)).collect(),
+            Some([left, right]) => {
+                left.iter().zip(right).map(|(l, r)| Some((l.as_ref()? + r.as_ref()?) * 0.5)).collect()
+            }
             None => samples(Joint::Pelvis)?,
         };
         let toes = both(Joint::LeftFoot, Joint::RightFoot);
@@ -91,11 +93,6 @@ impl Legs {
         self.grid.start_ns as f64 * 1e-9 + node * self.grid.step_s()
     }
 
-    /// Nodes in a time.
-    pub(super) fn nodes(&self, seconds: f64) -> usize {
-        (seconds / self.grid.step_s()).round() as usize
-    }
-
     /// Share of the frames between two times in which pelvis and both ankles were seen.
     pub(super) fn coverage(&self, from_s: f64, to_s: f64) -> f64 {
         let between: Vec<bool> =
@@ -105,9 +102,7 @@ impl Legs {
             n => between.iter().filter(|seen| **seen).count() as f64 / n as f64,
         }
     }
-}
 
-impl Legs {
     /// Number of the side in pairs of this module.
     pub(super) fn index(side: Side) -> usize {
         side as usize

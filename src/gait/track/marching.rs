@@ -30,9 +30,8 @@ pub(super) struct SpotContact {
 
 /// Runs of contacts of somebody who steps on the spot.
 pub(super) fn runs(legs: &Legs) -> Vec<Vec<SpotContact>> {
-    let heights: Vec<Option<[f64; 2]>> = (0..legs.grid.len)
-        .map(|k| Some([legs.ankles[0][k]?.place.y, legs.ankles[1][k]?.place.y]))
-        .collect();
+    let heights: Vec<Option<[f64; 2]>> =
+        (0..legs.grid.len).map(|k| Some([legs.ankles[0][k]?.place.y, legs.ankles[1][k]?.place.y])).collect();
     let mut found = Vec::new();
     let mut k = 0;
     while k < heights.len() {

@@ -5,13 +5,15 @@
 
 mod legs;
 mod marching;
+#[cfg(test)]
+mod tests;
 mod walking;
 
 use super::contact::GaitContact;
 use super::plausibility::SHORTEST_STRIDE_M;
 use crate::assessment::JointTrack;
 use legs::Legs;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 use walking::WalkContact;
 
 /// Fewest contacts that are a walk: one stride, both of whose steps were seen.
@@ -19,6 +21,12 @@ const FEWEST_CONTACTS: usize = 3;
 /// A stride that points this far aside from the one before belongs to a turn, radians; strides of a straight walk stay
 /// within a few degrees.
 const TURN: f64 = 15.0 * std::f64::consts::PI / 180.0;
+/// A floor that rises less than this is level: it makes a stride 0.02 % too short.
+const LEVEL_SLOPE: f64 = 0.02;
+/// A camera is tilted less than this, as the tangent of the angle; stairs are steeper.
+const STEEPEST_SLOPE: f64 = 0.45;
+/// Weight of a level floor across the ways, m².
+const ACROSS_PRIOR: f64 = 0.01;
 
 /// What was found in a track.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,9 +55,14 @@ pub(super) enum Stepping {
 /// The footfalls of a track.
 pub(super) fn footfalls(track: &JointTrack) -> Footfalls {
     let mut found = Footfalls { contacts: Vec::new(), kind: Stepping::NoLegs, has_backward: false };
-    let Some(legs) = Legs::of(track) else { return found };
+    let Some(mut legs) = Legs::of(track) else { return found };
     found.kind = Stepping::None;
-    let walks: Vec<Vec<WalkContact>> = walking::walks(&legs).into_iter().filter(|walk| is_walk(walk)).collect();
+    let walks_of = |legs: &Legs| walking::walks(legs).into_iter().filter(|walk| is_walk(walk)).collect::<Vec<_>>();
+    let mut walks = walks_of(&legs);
+    if let Some(level) = slope(&walks).and_then(|slope| Legs::of(&levelled(track, slope))) {
+        walks = walks_of(&level);
+        legs = level;
+    }
     let (backward, forward): (Vec<_>, Vec<_>) = walks.into_iter().partition(|walk| is_backward(&legs, walk));
     found.has_backward = !backward.is_empty();
     if !forward.is_empty() {
@@ -79,12 +92,40 @@ pub(super) fn footfalls(track: &JointTrack) -> Footfalls {
     found
 }
 
+/// How the height of the floor changes with `x` and `z` along the ways that were walked: a camera that looks down and does
+/// not know it sees the floor rise or fall, and strides too short. None when the floor is level, or steeper than a camera is
+/// ever tilted.
+fn slope(walks: &[Vec<WalkContact>]) -> Option<Vector2<f64>> {
+    let strides = walks.iter().flat_map(|walk| (2..walk.len()).filter_map(|i| stride(walk, i)));
+    // The plane of least squares; across the ways it is held level, by a prior of a centimetre to the metre.
+    let (mut normal, mut sum) = (Matrix2::identity() * ACROSS_PRIOR, Vector2::zeros());
+    for stride in strides {
+        let along = Vector2::new(stride.x, stride.z);
+        normal += along * along.transpose();
+        sum += along * stride.y;
+    }
+    let slope = normal.try_inverse()? * sum;
+    (LEVEL_SLOPE..STEEPEST_SLOPE).contains(&slope.norm()).then_some(slope)
+}
+
+/// The track turned so that a floor of a slope is level.
+fn levelled(track: &JointTrack, slope: Vector2<f64>) -> JointTrack {
+    let up = Vector3::new(-slope.x, 1.0, -slope.y);
+    let turn = UnitQuaternion::rotation_between(&up, &Vector3::y()).unwrap_or_default();
+    let mut level = track.clone();
+    for position in &mut level.positions_m {
+        *position = (turn * Vector3::from(*position).map(f64::from)).map(|value| value as f32).into();
+    }
+    level
+}
+
 /// True of contacts whose strides go somewhere.
 fn is_walk(walk: &[WalkContact]) -> bool {
     if walk.len() < FEWEST_CONTACTS {
         return false;
     }
-    let mut strides: Vec<f64> = (2..walk.len()).filter_map(|i| Some(stride(walk, i)?.dot(&walk[i].direction))).collect();
+    let mut strides: Vec<f64> =
+        (2..walk.len()).filter_map(|i| Some(stride(walk, i)?.dot(&walk[i].direction))).collect();
     strides.sort_unstable_by(f64::total_cmp);
     strides.get(strides.len() / 2).is_some_and(|stride| *stride >= SHORTEST_STRIDE_M)
 }

@@ -23,8 +23,9 @@ const LEAST_SWING_M: f64 = 0.10;
 const LEAST_SWING_SHARE: f64 = 0.3;
 /// Speed of a foot at initial contact, as share of the pelvis' speed.
 const CONTACT_SPEED: f64 = 0.5;
-/// Speed of the toes at terminal contact, and of the ankle of a sensor without toes, as share of the pelvis' speed.
-const RELEASE_SPEED: f64 = 1.0;
+/// Speed of the toes at terminal contact, and of the ankle of a sensor without toes, as share of the pelvis' speed: between
+/// what captured and what simulated walks have.
+const RELEASE_SPEED: f64 = 1.35;
 const RELEASE_ANKLE_SPEED: f64 = 1.6;
 /// Part of the time from a contact to the next one in which the foot is flat.
 const FLAT: [f64; 2] = [0.25, 0.75];
