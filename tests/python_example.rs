@@ -1,6 +1,10 @@
-//! The Python example writes a recording that decodes, when Python with the `mcap` package is there.
+//! The Python examples: a recording that decodes, and a home app that records, uploads, waits and shows the report. They run
+//! when Python with the `mcap` package is there.
 
-use std::process::Command;
+#![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
 use surefoot::body::Joint;
 use surefoot::geometry::three_point::flexion_of_three_points;
 use surefoot::recording::{Format, Inspector, Limits, decode};
@@ -8,9 +12,7 @@ use surefoot::signal::interpolation::interpolate;
 
 #[test]
 fn the_python_example_writes_a_recording_whose_knees_bend_as_its_reference_says() {
-    let has_mcap = Command::new("python3").args(["-c", "import mcap.writer, zstandard"]).output();
-    if !has_mcap.is_ok_and(|output| output.status.success()) {
-        println!("skipped: python3 with the package `mcap` is not there");
+    if !has_mcap() {
         return;
     }
     let folder = tempfile::tempdir().expect("a folder");
@@ -42,4 +44,45 @@ fn the_python_example_writes_a_recording_whose_knees_bend_as_its_reference_says(
         // Positions are rounded to 0.01 mm on segments of 0.4 m, angles are read between samples 10 ms apart.
         assert!(truth.is_nan() || (raw - truth).abs() < 0.01, "frame {t}: {raw} and {truth}");
     }
+}
+
+#[test]
+fn the_home_app_records_uploads_waits_and_shows_the_report() {
+    if !has_mcap() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["serve", "--json", "--listen", "127.0.0.1:0", "--data-dir"];
+    let mut service = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    let service = service.args(arguments).arg(folder.path().join("data")).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut service = Service(service.spawn().unwrap());
+    let mut started = String::new();
+    BufReader::new(service.0.stdout.take().unwrap()).read_line(&mut started).unwrap();
+    let started: serde_json::Value = serde_json::from_str(&started).unwrap();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/python/home_app.py");
+    let arguments = [&started["address"], &started["admin_key"]].map(|value| value.as_str().unwrap());
+    let app = Command::new("python3").arg(script).args(arguments).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
+    let said = String::from_utf8_lossy(&app.stdout);
+    assert!(app.status.success(), "{said}{}", String::from_utf8_lossy(&app.stderr));
+    assert!(said.contains("assessed: measured, 3 repetitions"), "{said}");
+    assert!(said.contains("Report of home-") && said.contains("not a diagnosis"), "{said}");
+}
+
+/// Ends with the test.
+struct Service(Child);
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn has_mcap() -> bool {
+    let found = Command::new("python3").args(["-c", "import mcap.writer, zstandard"]).output();
+    let has_mcap = found.is_ok_and(|output| output.status.success());
+    if !has_mcap {
+        println!("skipped: python3 with the package `mcap` is not there");
+    }
+    has_mcap
 }

@@ -97,7 +97,7 @@ impl JointsResponse {
 /// OpenSim), `bvh` (joint angles on the linked skeleton, in place).
 #[utoipa::path(get, path = "/v1/assessments/{id}/export", tag = "assessments", operation_id = "export_assessment",
     params(AssessmentPath, ExportQuery),
-    responses((status = 200, description = "The file", content_type = "text/plain", body = String)))]
+    responses((status = 200, description = "The file", content((String = "text/csv"), (String = "text/plain")))))]
 async fn export_assessment(
     State(state): State<AppState>,
     caller: Caller,
@@ -133,7 +133,8 @@ async fn export_assessment(
 
 /// Read where joints were
 ///
-/// Positions as the camera gave them, for replay; at most sixty frames a second.
+/// For replay, at most sixty frames a second: positions that the assessment estimates (fusion, leg pose), or else those that the
+/// camera gave.
 #[utoipa::path(get, path = "/v1/assessments/{id}/joints", tag = "assessments", operation_id = "read_joints",
     params(AssessmentPath, JointsQuery),
     responses((status = 200, description = "The joints", body = JointsResponse)))]

@@ -21,6 +21,7 @@ pub mod observe;
 mod openapi;
 pub mod page;
 pub mod patients;
+pub mod protocols;
 pub mod recordings;
 pub mod report;
 pub mod request;
@@ -85,6 +86,7 @@ fn documented_routes() -> OpenApiRouter<AppState> {
         .merge(assessments::router())
         .merge(series::router())
         .merge(noise_models::router())
+        .merge(protocols::router())
         .merge(entries::router())
         .merge(report::router())
         .merge(exports::router())

@@ -8,6 +8,7 @@ use super::request::{ApiPath, ApiQuery};
 use super::state::AppState;
 use super::text;
 use crate::fall_risk::{CHANGE_RULES, ChangeInfo, Finding, Known, Measures, Person, RULES, RuleInfo, Sex, findings};
+use crate::protocol;
 use crate::report::{
     Adherence, CAUTION, MeasureRecord, MeasureSource, PatientReport, PatientSummary, StatusCounts, Trend, needed,
 };
@@ -275,7 +276,7 @@ pub(super) async fn report_of(
         as_of,
         software_version: env!("CARGO_PKG_VERSION"),
         counts: StatusCounts::of(&found),
-        needed: needed(&found, |_| Vec::new()),
+        needed: needed(&found, protocol::protocols_measuring),
         findings: found,
         measures: facts.measures,
         trends,

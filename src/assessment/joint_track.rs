@@ -1,5 +1,6 @@
 //! Where joints were: for replay, for export, and for measures that need places and not angles.
 
+use super::series::Series;
 use crate::body::Joint;
 use crate::recording::SkeletonRecording;
 
@@ -13,21 +14,15 @@ pub struct JointTrack {
     pub joints: Vec<Joint>,
     /// Time of each frame on the recording's clock, nanoseconds, strictly increasing.
     pub time_ns: Vec<i64>,
-    /// Positions in the sensor's `world` (right-handed, y up), metres; NaN where the sensor had lost the joint.
+    /// Positions in the sensor's `world` (right-handed, y up), metres; NaN where the joint was lost.
     pub positions_m: Vec<[f32; 3]>,
 }
 
 impl JointTrack {
     /// The positions that the camera gave, at most sixty frames a second. A joint without any confidence counts as lost.
     pub fn of_skeleton(skeleton: &SkeletonRecording) -> Self {
-        let least_gap_ns = (0.999e9 / HIGHEST_RATE_HZ) as i64;
         let mut track = Self { joints: skeleton.joints.clone(), ..Self::default() };
-        let mut last_ns = None;
-        for (t, &time_ns) in skeleton.time_ns.iter().enumerate() {
-            if last_ns.is_some_and(|last: i64| time_ns.saturating_sub(last) < least_gap_ns) {
-                continue;
-            }
-            last_ns = Some(time_ns);
+        for (t, time_ns) in thinned(&skeleton.time_ns) {
             track.time_ns.push(time_ns);
             let seen = skeleton.frame(t).iter().zip(skeleton.frame_confidence(t));
             track.positions_m.extend(seen.map(|(position, confidence)| match *confidence > 0.0 {
@@ -36,6 +31,28 @@ impl JointTrack {
             }));
         }
         track
+    }
+
+    /// The places that an assessment itself estimates, its channels `{joint}_x_m`, `_y_m` and `_z_m`, at most sixty frames a
+    /// second; none without any. `axes` turn them into the sensor's `world`, by the sign of each coordinate.
+    pub fn of_series(time_ns: &[i64], series: &[Series], axes: [f32; 3]) -> Option<Self> {
+        let channel = |joint: Joint, axis: &str| {
+            let name = format!("{}_{axis}_m", joint.name());
+            series.iter().find(|series| series.channel == name)
+        };
+        let places =
+            |joint: &Joint| Some((*joint, [channel(*joint, "x")?, channel(*joint, "y")?, channel(*joint, "z")?]));
+        let found: Vec<(Joint, [&Series; 3])> = Joint::ALL.iter().filter_map(places).collect();
+        if found.is_empty() {
+            return None;
+        }
+        let mut track = Self { joints: found.iter().map(|(joint, _)| *joint).collect(), ..Self::default() };
+        for (t, time_ns) in thinned(time_ns) {
+            track.time_ns.push(time_ns);
+            let place = |columns: &[&Series; 3]| std::array::from_fn(|axis| axes[axis] * columns[axis].value[t]);
+            track.positions_m.extend(found.iter().map(|(_, columns)| place(columns)));
+        }
+        Some(track)
     }
 
     /// Number of frames.
@@ -58,6 +75,19 @@ impl JointTrack {
         let n = self.joints.len();
         &self.positions_m[t * n..(t + 1) * n]
     }
+}
+
+/// Places in a series of times, and the times, so that no more than [`HIGHEST_RATE_HZ`] are left of a second.
+fn thinned(time_ns: &[i64]) -> impl Iterator<Item = (usize, i64)> {
+    let least_gap_ns = (0.999e9 / HIGHEST_RATE_HZ) as i64;
+    let mut last_ns: Option<i64> = None;
+    time_ns.iter().copied().enumerate().filter(move |(_, time_ns)| {
+        let is_kept = last_ns.is_none_or(|last| time_ns.saturating_sub(last) >= least_gap_ns);
+        if is_kept {
+            last_ns = Some(*time_ns);
+        }
+        is_kept
+    })
 }
 
 #[cfg(test)]
@@ -88,5 +118,15 @@ mod tests {
     fn a_faster_system_is_thinned_to_sixty_frames_a_second() {
         assert_eq!(JointTrack::of_skeleton(&skeleton(8_333_333)).len(), 120);
         assert_eq!(JointTrack::of_skeleton(&skeleton(16_666_666)).len(), 240);
+    }
+
+    #[test]
+    fn places_that_an_assessment_estimates_are_taken_with_the_signs_of_their_axes() {
+        let column = |name: &str, value: f32| Series { value: vec![value; 3], ..Series::empty(name, 3) };
+        let series = [column("left_knee_x_m", 1.0), column("left_knee_y_m", 2.0), column("left_knee_z_m", 3.0)];
+        let times = [0, 5_000_000, 20_000_000];
+        let track = JointTrack::of_series(&times, &series, [1.0, -1.0, -1.0]).unwrap();
+        assert_eq!((track.time_ns.as_slice(), track.frame(1)), (&[0, 20_000_000][..], &[[1.0, -2.0, -3.0]][..]));
+        assert_eq!(JointTrack::of_series(&times, &series[..2], [1.0; 3]), None);
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod assess;
 mod assess_legs;
+pub mod backup;
 pub mod demo;
 pub mod evaluate;
 pub mod import;
@@ -38,6 +39,9 @@ enum Command {
     Evaluate(evaluate::Args),
     Train(train::Args),
     Key(key::Args),
+    Backup(backup::BackupArgs),
+    Restore(backup::RestoreArgs),
+    Doctor(backup::DoctorArgs),
     Openapi(openapi::Args),
 }
 
@@ -82,6 +86,9 @@ pub fn run() -> anyhow::Result<()> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Key(args) => runtime.block_on(key::run(&args)),
+        Command::Backup(args) => runtime.block_on(backup::back_up(&args)),
+        Command::Restore(args) => runtime.block_on(backup::restore(&args)),
+        Command::Doctor(args) => runtime.block_on(backup::examine(&args)),
         Command::Openapi(args) => openapi::run(&args),
     }
 }

@@ -94,5 +94,8 @@ pub fn assess_with(
             "a noise model is trained from several recordings; one recording alone is assessed by joint_angles",
         )),
     }?;
-    Ok(Assessment { joints: recording.skeleton.as_ref().map(JointTrack::of_skeleton), ..assessment })
+    // Places that were estimated survive what the camera did not see.
+    let estimated = JointTrack::of_series(&assessment.time_ns, &assessment.series, [1.0; 3]);
+    let seen = || recording.skeleton.as_ref().map(JointTrack::of_skeleton);
+    Ok(Assessment { joints: estimated.or_else(seen), ..assessment })
 }

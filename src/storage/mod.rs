@@ -14,6 +14,7 @@
 
 pub mod access;
 pub mod assessments;
+pub mod backup;
 pub mod blobs;
 pub mod clients;
 pub mod clock;
@@ -36,6 +37,7 @@ pub mod sessions;
 
 pub use access::Access;
 pub use assessments::{AssessmentFilter, StoredAssessment};
+pub use backup::{Ailment, BackupManifest, restore};
 pub use blobs::{BlobReader, BlobStore, BlobWriter, SealedBlob, StoredBlob};
 pub use clients::{ApiKey, Client, Role};
 pub use clock::{Clock, ManualClock, SystemClock};

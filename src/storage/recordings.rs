@@ -163,6 +163,21 @@ impl Store {
         Ok(Page::from_rows(recordings, page, |recording| recording.id))
     }
 
+    /// The exercise or test that was done in a recording, as its header says it or else its session; for the worker.
+    ///
+    /// # Errors
+    /// `NotFound` when there is no such recording.
+    pub async fn declared_protocol(&self, id: RecordingId) -> Result<Option<String>, StorageError> {
+        let found = sqlx::query_scalar(
+            "SELECT coalesce(r.inspection ->> '$.header.protocol', s.protocol)
+             FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = ?1",
+        )
+        .bind(id)
+        .fetch_optional(self.reader())
+        .await?;
+        found.ok_or(StorageError::not_found("recording"))
+    }
+
     /// The recording that a job is about, for the worker, which serves every organisation.
     ///
     /// # Errors

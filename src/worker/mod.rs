@@ -14,6 +14,7 @@ use crate::assessment::noise_model::find_shipped;
 use crate::assessment::{Assessment, CalibrationChoice, JointAngleSettings, NoiseModel, NoiseModelSettings, Settings};
 use crate::pipeline::{Inputs, PatientCalibration, PipelineError};
 use crate::progress::{Monitor, Step};
+use crate::protocol;
 use crate::queue::{Failure, Finish, Job, JobError, Queue, Renewal, Trained};
 use crate::recording::decode::Limits;
 use crate::storage::{BlobReader, JobId, RecordingId, StorageError, StoredRecording};
@@ -169,9 +170,14 @@ impl Worker {
 
     async fn assessment(&self, job: &Job, inputs: Inputs, monitor: &Monitor) -> Result<Assessment, AttemptError> {
         let (reader, recording) = self.open(job.recording_id).await?;
+        let declared = self.queue.store().declared_protocol(job.recording_id).await?;
         let (assess, settings, view) = (self.assess.clone(), job.settings.clone(), monitor.clone());
         let sha256 = recording.blob.sha256.clone();
-        let computing = spawn_blocking(move || assess(reader, &recording, &settings, &inputs, &view));
+        let computing = spawn_blocking(move || {
+            let assessment = assess(reader, &recording, &settings, &inputs, &view)?;
+            let performance = protocol::perform(declared.as_deref(), &assessment);
+            Ok(Assessment { performance: Some(performance), ..assessment })
+        });
         let mut assessment = self.watch(job, monitor, computing).await?;
         assessment.provenance.recording_sha256 = sha256;
         Ok(assessment)

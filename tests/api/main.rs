@@ -14,6 +14,7 @@ mod leg_pose;
 mod noise_models;
 mod patient_calibration;
 mod patients;
+mod performance;
 mod problems;
 mod recordings;
 mod report;

@@ -7,7 +7,7 @@ use super::{Legs, Track, TrackedFrame, seconds};
 use crate::assessment::quality::{Event, EventCount};
 use crate::assessment::series::FLAG_BRIDGED;
 use crate::assessment::{
-    Assessment, Gait, LegChannel, LegPoseSettings, Provenance, Quality, Series, Settings, Warning,
+    Assessment, Gait, JointTrack, LegChannel, LegPoseSettings, Provenance, Quality, Series, Settings, Warning,
 };
 use crate::body::Side;
 use crate::pipeline::PipelineError;
@@ -46,14 +46,16 @@ pub(super) fn assessment(track: &Track, settings: &LegPoseSettings) -> Result<As
     }
     let series = series(track);
     let gait = gait(&feet(track));
+    let time_ns: Vec<i64> = track.frames.iter().map(|frame| frame.time_ns).collect();
     Ok(Assessment {
         pipeline: "leg_pose",
-        time_ns: track.frames.iter().map(|frame| frame.time_ns).collect(),
+        // The camera's y points down and its z away.
+        joints: JointTrack::of_series(&time_ns, &series, [1.0, -1.0, -1.0]),
+        time_ns,
         summary: series.iter().map(Series::summarize).collect(),
         series,
         quality: quality(track, &gait),
         gait: Some(gait),
-        joints: None,
         performance: None,
         provenance: Provenance {
             software_version: env!("CARGO_PKG_VERSION").to_owned(),

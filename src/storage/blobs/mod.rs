@@ -133,6 +133,16 @@ impl BlobStore {
         }))
     }
 
+    /// Keys of all blobs.
+    ///
+    /// # Errors
+    /// When the store fails.
+    pub async fn keys(&self) -> Result<Vec<String>, StorageError> {
+        let listed: Vec<_> = self.store.list(None).collect().await;
+        let key = |found: object_store::Result<object_store::ObjectMeta>| Ok(found?.location.to_string());
+        listed.into_iter().map(key).collect::<object_store::Result<_>>().map_err(store_error("listing the blobs"))
+    }
+
     async fn keep(&self, part: &Part, blob: &StoredBlob) -> Result<(), StorageError> {
         let key = Key::from(blob.key.as_str());
         let there = match self.store.head(&key).await {

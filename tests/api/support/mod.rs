@@ -1,6 +1,7 @@
 //! A service in the test's own process, and a client that knows the document.
 
 pub mod contract;
+pub mod fhir;
 pub mod samples;
 
 use axum::Router;
