@@ -18,6 +18,7 @@
 //! | [`recording`] | what a client uploads, decoded |
 //! | [`assessment`] | what one pipeline found |
 //! | [`pipeline`] | recording → assessment, pure |
+//! | [`protocol`] | exercises and tests: which movement, its repetitions, its measures |
 //! | [`synthetic`] | recordings with known truth |
 //! | [`evaluation`] | agreement with a reference |
 //! | [`fall_risk`] | rules with id, unit, citation |
@@ -51,6 +52,7 @@ pub mod fall_risk;
 pub mod geometry;
 pub mod pipeline;
 pub mod progress;
+pub mod protocol;
 pub mod queue;
 pub mod recording;
 pub mod signal;

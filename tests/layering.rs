@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The house, top to bottom, as in `src/lib.rs`.
-const HOUSE: [&str; 17] = [
+const HOUSE: [&str; 18] = [
     "geometry",
     "estimation",
     "signal",
@@ -14,6 +14,7 @@ const HOUSE: [&str; 17] = [
     "recording",
     "assessment",
     "pipeline",
+    "protocol",
     "synthetic",
     "evaluation",
     "fall_risk",
