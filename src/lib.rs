@@ -19,6 +19,7 @@
 //! | [`assessment`] | what one pipeline found |
 //! | [`gait`] | footfalls → gait measures |
 //! | [`pipeline`] | recording → assessment, pure |
+//! | [`protocol`] | exercises and tests: which movement, its repetitions, its measures |
 //! | [`synthetic`] | recordings with known truth |
 //! | [`evaluation`] | agreement with a reference |
 //! | [`fall_risk`] | rules with id, unit, citation |
@@ -54,6 +55,7 @@ pub mod gait;
 pub mod geometry;
 pub mod pipeline;
 pub mod progress;
+pub mod protocol;
 pub mod queue;
 pub mod recording;
 pub mod report;

@@ -15,6 +15,7 @@ const HOUSE: [&str; 18] = [
     "assessment",
     "gait",
     "pipeline",
+    "protocol",
     "synthetic",
     "evaluation",
     "fall_risk",

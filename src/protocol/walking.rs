@@ -1,0 +1,43 @@
+//! Walks: the pelvis goes somewhere.
+
+use super::motion::{INTERVAL_S, Motion};
+use nalgebra::Vector3;
+
+/// Speed of the pelvis below which somebody stands, metres per second.
+const STANDING_MPS: f64 = 0.15;
+
+/// Least way from the first to the farthest place, metres: two steps.
+const LEAST_M: f64 = 1.2;
+
+/// Time over which the pelvis is averaged, seconds: half a step.
+const AVERAGE_S: f64 = 0.4;
+
+/// A walk.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Walk {
+    /// Way of the pelvis while it moved, metres.
+    pub distance_m: f64,
+    /// Time in which it moved, seconds.
+    pub moving_s: f64,
+}
+
+/// The walk of a recording; none when the pelvis stays about where it was, or its place is not known.
+pub fn walk(motion: &Motion) -> Option<Walk> {
+    let places = motion.places.as_ref()?;
+    let half = (0.5 * AVERAGE_S / INTERVAL_S) as usize;
+    let flat = |v: &Vector3<f64>| Vector3::new(v.x, 0.0, v.z);
+    let seen: Vec<Vector3<f64>> = places.pelvis.iter().map(flat).filter(|place| place.x.is_finite()).collect();
+    let first = *seen.first()?;
+    if seen.iter().map(|place| (place - first).norm()).fold(0.0, f64::max) < LEAST_M {
+        return None;
+    }
+    let mut walk = Walk { distance_m: 0.0, moving_s: 0.0 };
+    for pair in seen.windows(2 * half + 1) {
+        let step = (pair[2 * half] - pair[0]) / (2 * half) as f64;
+        if step.norm() >= STANDING_MPS * INTERVAL_S {
+            walk.distance_m += step.norm();
+            walk.moving_s += INTERVAL_S;
+        }
+    }
+    (walk.distance_m >= LEAST_M).then_some(walk)
+}
