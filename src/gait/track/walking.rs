@@ -3,8 +3,9 @@
 //! ```text
 //! u(t)   direction of the way of the pelvis along the floor
 //! d(t)   (left ankle − right ankle) · u: a left step's end is a maximum, a right step's a minimum
-//! IC     the last time before that extremum at which the foot was faster along u than CONTACT_SPEED × the pelvis
-//! TC     the first time after it at which the other foot is faster than RELEASE_SPEED × the pelvis
+//! TC     the first time since the extremum before at which the toes are faster along u than a share of the fastest that
+//!        they are in this swing
+//! IC     the last time before the extremum, or else the first after it, at which the ankle has become slower than a share
 //! H      mean place of the ankle in the middle of the time until the next contact, when the foot is flat
 //! ```
 //!
@@ -21,12 +22,14 @@ const LEAST_SPEED_MPS: f64 = 0.06;
 /// Way that the feet must go against each other, and share of the usual such way, for an extremum to be a step.
 const LEAST_SWING_M: f64 = 0.10;
 const LEAST_SWING_SHARE: f64 = 0.3;
-/// Speed of a foot at initial contact, as share of the pelvis' speed.
-const CONTACT_SPEED: f64 = 0.5;
-/// Speed of the toes at terminal contact, and of the ankle of a sensor without toes, as share of the pelvis' speed: between
-/// what captured and what simulated walks have.
-const RELEASE_SPEED: f64 = 1.35;
-const RELEASE_ANKLE_SPEED: f64 = 1.6;
+/// Speed of an ankle at initial contact, as share of the fastest in its swing.
+const CONTACT_SHARE: f64 = 0.16;
+/// Speed of the toes at terminal contact, and of the ankle of a sensor without toes, as share of the fastest in the swing:
+/// between what captured and what simulated walks have.
+const RELEASE_SHARE: f64 = 0.37;
+const RELEASE_ANKLE_SHARE: f64 = 0.5;
+/// Time after the extremum in which a foot may still become slow, seconds: the heel of the other foot rises already.
+const LATE_CONTACT_S: f64 = 0.15;
 /// Part of the time from a contact to the next one in which the foot is flat.
 const FLAT: [f64; 2] = [0.25, 0.75];
 /// Time after the last contact of a walk that stands for the next one when the track ends, as share of the step before.
@@ -129,24 +132,30 @@ pub(super) fn zigzag(values: &[f64], least: f64) -> Vec<usize> {
     nodes
 }
 
-/// Speed of a point along the direction of walking, less a share of the pelvis' own.
-fn excess(legs: &Legs, point: &[Option<Moving>], k: usize, share: f64) -> Option<f64> {
-    let (u, speed) = progress(&legs.way[k])?;
-    Some(point[k]?.velocity.dot(&u) - share * speed)
+/// Speed of a point along the direction of walking, m/s.
+fn speed(legs: &Legs, point: &[Option<Moving>], k: usize) -> Option<f64> {
+    let (u, _) = progress(&legs.way[k])?;
+    Some(point[k]?.velocity.dot(&u))
 }
 
 fn contacts(legs: &Legs, extrema: &[(usize, Side)], run: std::ops::Range<usize>) -> Vec<Vec<WalkContact>> {
     let mut found: Vec<WalkContact> = Vec::new();
+    let late_nodes = (LATE_CONTACT_S / legs.grid.step_s()).round() as usize;
     for (i, &(at, side)) in extrema.iter().enumerate() {
         let before = i.checked_sub(1).map_or(run.start, |i| extrema[i].0);
         let ankle = &legs.ankles[Legs::index(side)];
-        let Some(node) = last_fall(before..at, |k| excess(legs, ankle, k, CONTACT_SPEED)) else { continue };
+        let fastest = |point: &[Option<Moving>]| (before..at).filter_map(|k| speed(legs, point, k)).fold(0.0, f64::max);
+        let limit = CONTACT_SHARE * fastest(ankle);
+        let excess = |k: usize| Some(speed(legs, ankle, k)? - limit);
+        let late = at..(at + late_nodes).min(run.end - 1);
+        let Some(node) = last_fall(before..at, excess).or_else(|| first_fall(late, excess)) else { continue };
         let Some((direction, _)) = progress(&legs.way[(node.round() as usize).min(run.end - 1)]) else { continue };
         let (toes, share) = match legs.has_toes {
-            true => (&legs.toes[Legs::index(side)], RELEASE_SPEED),
-            false => (ankle, RELEASE_ANKLE_SPEED),
+            true => (&legs.toes[Legs::index(side)], RELEASE_SHARE),
+            false => (ankle, RELEASE_ANKLE_SHARE),
         };
-        let toe_off = first_rise(before..at, |k| excess(legs, toes, k, share)).filter(|release| *release < node);
+        let limit = share * fastest(toes);
+        let toe_off = first_rise(before..at, |k| Some(speed(legs, toes, k)? - limit)).filter(|toe_off| *toe_off < node);
         found.push(WalkContact { side, node, toe_off, place: None, direction });
     }
     let longest = LONGEST_STEP_S / legs.grid.step_s();
@@ -167,6 +176,11 @@ fn last_fall(range: std::ops::Range<usize>, value: impl Fn(usize) -> Option<f64>
         }
     }
     None
+}
+
+/// The first place in a range where a value falls through zero, between nodes.
+fn first_fall(range: std::ops::Range<usize>, value: impl Fn(usize) -> Option<f64>) -> Option<f64> {
+    first_rise(range, |k| Some(-value(k)?))
 }
 
 /// The first place in a range where a value rises through zero, between nodes.
