@@ -11,7 +11,7 @@ CREATE TABLE joint_tracks (
 ) STRICT;
 
 -- Every value that was ever measured of a patient, whether by an assessment or entered by a person. `side` is empty for the
--- whole body. Rows are only ever added; of a recording's assessments the newest counts.
+-- whole body, `definition` where a measure has one definition. Rows are only ever added; of a recording's assessments the newest counts.
 CREATE TABLE measures (
     id BLOB NOT NULL PRIMARY KEY CHECK (length(id) = 16),
     organisation_id BLOB NOT NULL REFERENCES organisations (id),
@@ -22,7 +22,7 @@ CREATE TABLE measures (
     standard_error REAL,
     n_observations INTEGER,
     error_sd REAL,
-    definition TEXT,
+    definition TEXT NOT NULL DEFAULT '',
     protocol TEXT,
     reason TEXT NOT NULL DEFAULT '',
     assessment_id BLOB REFERENCES assessments (id),
@@ -34,7 +34,7 @@ CREATE TABLE measures (
     CHECK ((assessment_id IS NULL) <> (measurement_id IS NULL))
 ) STRICT;
 CREATE INDEX measures_of_patient ON measures (patient_id, id);
-CREATE INDEX measures_by_name ON measures (patient_id, name, side, measured_at, id);
+CREATE INDEX measures_by_name ON measures (patient_id, name, side, definition, measured_at, id);
 
 -- What had been entered before: ids after those of the measurements, so that their order stays.
 INSERT INTO measures (id, organisation_id, patient_id, name, value, standard_error, n_observations, error_sd,

@@ -296,8 +296,7 @@ async fn trends(
 ) -> Result<Vec<Trend>, ApiError> {
     let mut trends = Vec::with_capacity(newest.len());
     for measure in newest {
-        let of = (measure.name.as_str(), measure.side);
-        let course = store.course_of_measure(&caller.access, patient, of, as_of, points).await?;
+        let course = store.course_of_measure(&caller.access, patient, measure, as_of, points).await?;
         trends.extend(Trend::of(&course));
     }
     Ok(trends)
@@ -333,6 +332,7 @@ impl Facts {
         let answered = store.newest_answers(&caller.access, id, by).await?;
         let records = store.newest_measures(&caller.access, id, by).await?;
         let mut measures = Measures::default();
+        // Where a measure has several definitions the last one counts for rules: footprints, as walkways measure them.
         let whole_body = records.iter().enumerate().filter(|(_, record)| record.side.is_none());
         let taken = whole_body.filter(|(_, record)| measures.take(&record.name, record.measured()));
         let used = taken.map(|(i, _)| i).collect();

@@ -1,6 +1,7 @@
 //! What one pipeline found in one recording: series, summary, quality, provenance. Values only, no behaviour of HTTP
 //! or of a database.
 
+pub mod footfalls;
 pub mod fusion_quality;
 pub mod fusion_settings;
 pub mod gait;
@@ -15,6 +16,7 @@ pub mod quality;
 pub mod series;
 pub mod settings;
 
+pub use footfalls::Footfalls;
 pub use fusion_quality::{ClockQuality, FusionQuality, UnitQuality};
 pub use fusion_settings::{Clocks, FusionMethod, Mounting, SkeletonFusionSettings};
 pub use gait::Gait;

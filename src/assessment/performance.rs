@@ -1,5 +1,6 @@
 //! How an exercise or a test was performed: repetitions, and what was measured of them.
 
+use super::footfalls::Footfalls;
 use crate::body::Side;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -22,6 +23,9 @@ pub struct Performance {
     pub repetitions: Vec<Repetition>,
     /// What was measured over the recording.
     pub measures: Vec<PerformanceMeasure>,
+    /// Contacts of the feet, when a walk was measured.
+    #[serde(default)]
+    pub footfalls: Option<Footfalls>,
 }
 
 /// Whether a performance could be measured.

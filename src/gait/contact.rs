@@ -1,81 +1,10 @@
 //! One foot that comes down, and why a step may not count.
 
-use crate::body::Side;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
-
-/// A foot that came down: what every measure of gait is made of.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct GaitContact {
-    /// The foot that came down.
-    pub side: Side,
-    /// Its initial contact, seconds from the recording's first frame.
-    pub contact_s: f64,
-    /// The terminal contact before it: when this foot had left the floor to come here; null when that was not seen.
-    pub toe_off_s: Option<f64>,
-    /// Where it stood on the floor: `x` and `z` of the recording's `world`, turned so that the floor is level, metres; null
-    /// when that was not seen, or when the sensor moved.
-    pub place_m: Option<[f64; 2]>,
-    /// The walk that it belongs to, from 0: a walk ends where somebody stands, turns back or was not seen.
-    pub walk: u64,
-    /// Share of the frames since the contact before in which pelvis and both feet were seen, 0 to 1.
-    pub coverage: f64,
-    /// True when the direction of walking changes with this step.
-    pub is_turning: bool,
-    /// Why the means leave the step out that ends with this contact; empty when they do not.
-    pub excluded_because: Vec<StepExclusion>,
-}
-
-impl GaitContact {
-    /// A contact of the first walk that was fully seen, on a straight way.
-    pub fn new(side: Side, contact_s: f64, place_m: [f64; 2]) -> Self {
-        Self {
-            side,
-            contact_s,
-            toe_off_s: None,
-            place_m: Some(place_m),
-            walk: 0,
-            coverage: 1.0,
-            is_turning: false,
-            excluded_because: Vec::new(),
-        }
-    }
-}
+pub use crate::assessment::footfalls::{GaitContact, StepExclusion, StepExclusionCount};
 
 /// The place on the floor of a point in `world`, y being up.
 pub fn on_floor(point_m: [f64; 3]) -> [f64; 2] {
     [point_m[0], point_m[2]]
-}
-
-/// Why a step does not count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum StepExclusion {
-    /// One of the first or last two steps of a walk.
-    FirstOrLast,
-    /// Part of a turn.
-    Turning,
-    /// Seen in less than 80 % of its frames.
-    LowCoverage,
-    /// The foot before it was the same, or the contact before it was not seen.
-    MissedContact,
-}
-
-impl StepExclusion {
-    /// Every reason.
-    pub const ALL: [StepExclusion; 4] =
-        [StepExclusion::FirstOrLast, StepExclusion::Turning, StepExclusion::LowCoverage, StepExclusion::MissedContact];
-
-    /// The reason of a name, as [`Gait`](crate::assessment::Gait) writes it.
-    pub fn of_name(name: &str) -> Option<Self> {
-        match name {
-            "first_or_last" => Some(StepExclusion::FirstOrLast),
-            "turning" => Some(StepExclusion::Turning),
-            "low_coverage" => Some(StepExclusion::LowCoverage),
-            "missed_contact" => Some(StepExclusion::MissedContact),
-            _ => None,
-        }
-    }
 }
 
 /// Steps at either end of a walk that do not count.
@@ -102,15 +31,6 @@ pub fn mark_excluded(contacts: &mut [GaitContact]) {
     }
 }
 
-/// Steps that were left out for one reason.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct StepExclusionCount {
-    /// The reason.
-    pub reason: StepExclusion,
-    /// Steps; one with two reasons counts under both.
-    pub n_steps: u64,
-}
-
 /// Steps left out, by reason.
 pub fn count_excluded(contacts: &[GaitContact]) -> Vec<StepExclusionCount> {
     let count = |reason: StepExclusion| {
@@ -123,6 +43,7 @@ pub fn count_excluded(contacts: &[GaitContact]) -> Vec<StepExclusionCount> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::Side;
 
     fn walk_of(n: usize) -> Vec<GaitContact> {
         let side = |i: usize| if i.is_multiple_of(2) { Side::Right } else { Side::Left };

@@ -19,25 +19,15 @@ pub use spread::corrected_sd;
 pub use summary::{HEEL_TO_OPPOSITE_LINE, PlaceDefinition, StepSelection};
 
 use crate::assessment::gait::FLAT_FOOTPRINTS;
-use crate::assessment::{Gait, JointTrack, PerformanceMeasure};
-use serde::{Deserialize, Serialize};
+use crate::assessment::{Footfalls, Gait, JointTrack, PerformanceMeasure};
 use track::Stepping;
-use utoipa::ToSchema;
-
-/// Standard deviation of the constant difference between the errors of both ankles of a depth camera's skeleton, in each
-/// axis, metres: 45 mm that stay and 30 mm that follow the posture, of a length in three axes, at each ankle.
-const FOOT_OFFSET_SD_M: f64 = 0.044;
-/// Standard deviation of the error of one step length and one step width beside that, metres: walks with the error of a
-/// Kinect v2 (`surefoot evaluate gait`).
-const PLACE_ERROR_SD_M: [f64; 2] = [0.003, 0.003];
 
 /// What footfalls tell of gait.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct GaitFindings {
     /// Measures over the steps that count.
     pub measures: Vec<PerformanceMeasure>,
-    /// The same over every step, also those that are left out: the first and last of a walk, and turns. A short walk has no
-    /// other; the rules of fall risk do not take them.
+    /// The same over every step, also those that are left out.
     pub measures_of_all_steps: Vec<PerformanceMeasure>,
     /// Every contact, by time.
     pub contacts: Vec<GaitContact>,
@@ -48,6 +38,21 @@ pub struct GaitFindings {
     /// Why nothing, or not everything, was found; empty when everything was.
     pub reason: String,
 }
+
+impl GaitFindings {
+    /// The measures that count, and what is told beside them.
+    pub fn into_parts(self) -> (Vec<PerformanceMeasure>, Footfalls) {
+        let Self { measures, measures_of_all_steps, contacts, exclusions, flags, reason } = self;
+        (measures, Footfalls { contacts, measures_of_all_steps, exclusions, flags, reason })
+    }
+}
+
+/// Standard deviation of the constant difference between the errors of both ankles of a depth camera's skeleton, in each
+/// axis, metres: 45 mm that stay and 30 mm that follow the posture, of a length in three axes, at each ankle.
+const FOOT_OFFSET_SD_M: f64 = 0.044;
+/// Standard deviation of the error of one step length and one step width beside that, metres: walks with the error of a
+/// Kinect v2 (`surefoot evaluate gait`).
+const PLACE_ERROR_SD_M: [f64; 2] = [0.003, 0.003];
 
 /// Gait from where joints were before a camera that stands. Nothing for a movement that is no walking; times alone for
 /// steps on the spot.

@@ -1,9 +1,7 @@
 //! Values that hardly any walk has: flagged, never discarded.
 
 use crate::assessment::PerformanceMeasure;
-use crate::body::Side;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+pub use crate::assessment::footfalls::GaitFlag;
 
 /// Where the limits come from.
 const CITATION: &str = "Mobilise-D limits over all cohorts (clinical evidence, section 5)";
@@ -28,23 +26,6 @@ const LIMITS: [Limits; 5] = [
 pub(super) const SHORTEST_STRIDE_M: f64 = 0.15;
 /// Longest plausible step, seconds.
 pub(super) const LONGEST_STEP_S: f64 = 2.124;
-
-/// A measure outside its plausible limits. People with a walking aid may be outside them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct GaitFlag {
-    /// Name of the measure.
-    pub measure: String,
-    /// The side that it is of; null when of both.
-    pub side: Option<Side>,
-    /// Its value.
-    pub value: f64,
-    /// Lowest plausible value, in the unit of the measure's name.
-    pub low: f64,
-    /// Highest plausible value.
-    pub high: f64,
-    /// Where the limits come from.
-    pub citation: String,
-}
 
 /// The measures outside their limits.
 pub fn flags(measures: &[PerformanceMeasure]) -> Vec<GaitFlag> {

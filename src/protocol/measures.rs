@@ -40,6 +40,7 @@ pub fn missing(spec: MeasureSpec, reason: impl Into<String>) -> PerformanceMeasu
         value: None,
         standard_error: None,
         error_sd: None,
+        definition: None,
         n_observations: None,
         reason: reason.into(),
     }

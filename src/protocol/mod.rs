@@ -115,3 +115,11 @@ pub fn protocols() -> Vec<ProtocolInfo> {
 pub fn find(id: &str) -> Option<&'static Protocol> {
     PROTOCOLS.iter().copied().find(|protocol| protocol.id == id || protocol.aliases.contains(&id))
 }
+
+/// The protocols that give a measure.
+pub fn protocols_measuring(measure: &str) -> Vec<&'static str> {
+    let gives = |protocol: &&&Protocol| {
+        protocol.measures.iter().flat_map(|list| list.iter()).any(|(name, ..)| *name == measure)
+    };
+    PROTOCOLS.iter().filter(gives).map(|protocol| protocol.id).collect()
+}

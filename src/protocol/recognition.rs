@@ -5,6 +5,7 @@ use super::motion::Motion;
 use super::repetitions::Found;
 use super::{Movement, Protocol, ProtocolSensor, find};
 use crate::assessment::{Assessment, Performance, PerformanceStatus};
+use crate::gait::{self, GaitFindings};
 
 /// Share of the best movement's time that another one must fill to be recognised beside it.
 const BESIDE: f64 = 0.4;
@@ -31,6 +32,7 @@ pub fn perform(declared: Option<&str>, assessment: &Assessment) -> Performance {
         recognized: seen.recognized.iter().map(|id| (*id).to_owned()).collect(),
         repetitions: Vec::new(),
         measures: Vec::new(),
+        footfalls: None,
     };
     let Some(protocol) = declared.and_then(find) else {
         performance.reason = not_of_the_catalogue(declared, &seen.recognized);
@@ -48,6 +50,11 @@ pub fn perform(declared: Option<&str>, assessment: &Assessment) -> Performance {
         if let (Some(found), Some(motion)) = (found, &seen.motion) {
             performance.repetitions = found.repetitions.clone();
             performance.measures = (protocol.measure)(motion, found);
+        }
+        if let (Movement::Walked, Some(found)) = (protocol.movement, steps_of(assessment)) {
+            let (measures, footfalls) = found.into_parts();
+            performance.measures.extend(measures);
+            performance.footfalls = Some(footfalls);
         }
         return performance;
     }
@@ -68,6 +75,12 @@ pub fn perform(declared: Option<&str>, assessment: &Assessment) -> Performance {
     performance.status = PerformanceStatus::OtherMovement;
     performance.reason = other_movement(protocol, &seen.recognized);
     performance
+}
+
+/// What the footfalls of a walk tell: those of the leg trackers, or else those of the skeleton.
+fn steps_of(assessment: &Assessment) -> Option<GaitFindings> {
+    let of_legs = assessment.gait.as_ref().map(gait::measures_of_steps);
+    of_legs.or_else(|| assessment.joints.as_ref().map(gait::measures_of_track))
 }
 
 /// Protocols of the catalogue that a recording looks like, the likeliest first.

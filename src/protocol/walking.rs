@@ -1,5 +1,6 @@
 //! Walks: the pelvis goes somewhere.
 
+use super::MeasureSpec;
 use super::motion::{INTERVAL_S, Motion};
 use nalgebra::Vector3;
 
@@ -11,6 +12,22 @@ const LEAST_M: f64 = 1.2;
 
 /// Time over which the pelvis is averaged, seconds: half a step.
 const AVERAGE_S: f64 = 0.4;
+
+/// What the footfalls of a walk tell, whichever sensor saw them.
+pub(super) const OF_FOOTFALLS: &[MeasureSpec] = &[
+    ("usual_speed_mps", "m/s", "way by time, between places of the same foot"),
+    ("step_length_m", "m", "from foot to foot along the way, by its definition"),
+    ("step_width_m", "m", "from foot to foot across the way, by its definition"),
+    ("stride_length_m", "m", "from a place of a foot to its next"),
+    ("step_time_s", "s", "from a contact to the other foot's"),
+    ("stride_time_s", "s", "from a contact to the same foot's next"),
+    ("cadence_spm", "{steps}/min", "steps a minute"),
+    ("double_support_pct", "%", "share of a stride with both feet on the floor"),
+    ("stance_pct", "%", "share of a stride with the foot on the floor"),
+    ("swing_pct", "%", "share of a stride with the foot in the air"),
+    ("step_width_sd_m", "m", "standard deviation over steps, each foot about its own mean"),
+    ("stride_time_sd_s", "s", "standard deviation over strides, each foot about its own mean"),
+];
 
 /// A walk.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -30,10 +30,10 @@ pub struct Trend {
     pub side: Option<Side>,
     /// UCUM unit.
     pub unit: String,
-    /// The values of one definition, the earliest first.
+    /// Definition that the values follow, where there are several.
+    pub definition: Option<String>,
+    /// The values, the earliest first.
     pub points: Vec<TrendPoint>,
-    /// Values left out because they follow another definition than the newest.
-    pub n_other_definitions: u64,
     /// From the value before to the newest; null with a single value.
     pub since_previous: Option<Change>,
     /// From the first value shown to the newest; null with fewer than three, where it would be the same.
@@ -85,20 +85,19 @@ pub struct Change {
 }
 
 impl Trend {
-    /// The trend of values of one measure and side, the earliest first; none without any.
+    /// The trend of values of one measure, side and definition, the earliest first; none without any.
     pub fn of(course: &[MeasureRecord]) -> Option<Self> {
         let newest = course.last()?;
-        let same: Vec<&MeasureRecord> = course.iter().filter(|m| m.definition == newest.definition).collect();
         let between = |earlier: &MeasureRecord| Change::between(earlier, newest);
         Some(Self {
             name: newest.name.clone(),
             title: title_of(&newest.name),
             side: newest.side,
             unit: unit_of(&newest.name).to_owned(),
-            points: same.iter().map(|m| TrendPoint::of(m)).collect(),
-            n_other_definitions: (course.len() - same.len()) as u64,
-            since_previous: same.len().checked_sub(2).map(|before| between(same[before])),
-            since_first: (same.len() > 2).then(|| between(same[0])),
+            definition: newest.definition.clone(),
+            points: course.iter().map(TrendPoint::of).collect(),
+            since_previous: course.len().checked_sub(2).map(|before| between(&course[before])),
+            since_first: (course.len() > 2).then(|| between(&course[0])),
         })
     }
 }
@@ -193,12 +192,11 @@ mod tests {
     }
 
     #[test]
-    fn values_of_another_definition_are_left_out_and_counted() {
-        let mut course: Vec<_> = (0..4).map(|day| record("step_length_m", day, 0.6, Some(0.01))).collect();
-        course[1].definition = Some("flat".to_owned());
+    fn a_course_of_three_is_also_compared_with_its_first() {
+        let course: Vec<_> = (0..3).map(|day| record("step_length_m", day, 0.6, Some(0.01))).collect();
         let trend = Trend::of(&course).unwrap();
-        assert_eq!((trend.points.len(), trend.n_other_definitions), (3, 1));
-        assert_eq!(trend.since_first.unwrap().from, course[0].measured_at);
+        assert_eq!((trend.points.len(), trend.since_first.unwrap().from), (3, course[0].measured_at));
+        assert_eq!(Trend::of(&course[..2]).unwrap().since_first, None);
         assert_eq!(Trend::of(&[]), None);
     }
 }

@@ -47,6 +47,7 @@ fn measure_from_row(row: &SqliteRow) -> Result<MeasureRecord, StorageError> {
         },
     };
     let (name, side): (String, &str) = (row.try_get("name")?, row.try_get("side")?);
+    let definition: String = row.try_get("definition")?;
     Ok(MeasureRecord {
         id: row.try_get("id")?,
         title: title_of(&name),
@@ -57,7 +58,7 @@ fn measure_from_row(row: &SqliteRow) -> Result<MeasureRecord, StorageError> {
         standard_error: row.try_get("standard_error")?,
         n_observations: row.try_get("n_observations")?,
         error_sd: row.try_get("error_sd")?,
-        definition: row.try_get("definition")?,
+        definition: Some(definition).filter(|definition| !definition.is_empty()),
         protocol: row.try_get("protocol")?,
         reason: row.try_get("reason")?,
         source,
@@ -98,7 +99,7 @@ pub(super) async fn insert_performance(
         .bind(standard_error)
         .bind(n_observations.map(|n| u32::try_from(n).unwrap_or(u32::MAX)))
         .bind(error_sd)
-        .bind(definition)
+        .bind(definition.as_deref().unwrap_or_default())
         .bind(&performance.protocol)
         .bind(reason)
         .bind(ms_from_time(now))
@@ -149,7 +150,7 @@ impl Store {
         Ok((measure_from_row(&row)?, row.try_get("patient_id")?))
     }
 
-    /// The value of each measure and side that was measured last, of what had been stored by a time.
+    /// The value of each measure, side and definition that was measured last, of what had been stored by a time.
     ///
     /// # Errors
     /// When the database fails.
@@ -162,12 +163,13 @@ impl Store {
         let rows = sqlx::query(concat!(
             "SELECT found.* FROM measures found WHERE found.organisation_id = ?1 AND found.id IN (
                  SELECT (SELECT m.id FROM measures m
-                         WHERE m.patient_id = ?2 AND m.name = known.name AND m.side = known.side AND m.created_at <= ?3
+                         WHERE m.patient_id = ?2 AND m.name = known.name AND m.side = known.side
+                           AND m.definition = known.definition AND m.created_at <= ?3
                            AND ",
             not_replaced!(),
             "            ORDER BY m.measured_at DESC, m.id DESC LIMIT 1)
-                 FROM (SELECT DISTINCT name, side FROM measures WHERE patient_id = ?2) known)
-             ORDER BY found.name, found.side"
+                 FROM (SELECT DISTINCT name, side, definition FROM measures WHERE patient_id = ?2) known)
+             ORDER BY found.name, found.side, found.definition"
         ))
         .bind(access.organisation)
         .bind(patient)
@@ -177,7 +179,8 @@ impl Store {
         rows.iter().map(measure_from_row).collect()
     }
 
-    /// The latest values of one measure and side that had been stored by a time, at most `most`, the earliest first.
+    /// The latest values of the measure, side and definition of `like` that had been stored by a time, at most `most`, the
+    /// earliest first.
     ///
     /// # Errors
     /// When the database fails.
@@ -185,22 +188,24 @@ impl Store {
         &self,
         access: &Access,
         patient: PatientId,
-        (name, side): (&str, Option<Side>),
+        like: &MeasureRecord,
         by: OffsetDateTime,
         most: u32,
     ) -> Result<Vec<MeasureRecord>, StorageError> {
         let rows = sqlx::query(concat!(
             "SELECT m.* FROM measures m
-             WHERE m.organisation_id = ?1 AND m.patient_id = ?2 AND m.created_at <= ?3 AND m.name = ?4 AND m.side = ?5 AND ",
+             WHERE m.organisation_id = ?1 AND m.patient_id = ?2 AND m.created_at <= ?3 AND m.name = ?4 AND m.side = ?5
+               AND m.definition = ?7 AND ",
             not_replaced!(),
             " ORDER BY m.measured_at DESC, m.id DESC LIMIT ?6"
         ))
         .bind(access.organisation)
         .bind(patient)
         .bind(ms_from_time(by))
-        .bind(name)
-        .bind(side.map_or("", Side::name))
+        .bind(&like.name)
+        .bind(like.side.map_or("", Side::name))
         .bind(most)
+        .bind(like.definition.as_deref().unwrap_or_default())
         .fetch_all(self.reader())
         .await?;
         rows.iter().rev().map(measure_from_row).collect()

@@ -4,7 +4,7 @@ use crate::assessment::PerformanceMeasure;
 use crate::protocol::measures::measured;
 use crate::protocol::motion::Motion;
 use crate::protocol::repetitions::Found;
-use crate::protocol::walking::walk;
+use crate::protocol::walking::{OF_FOOTFALLS, walk};
 use crate::protocol::{MeasureSpec, Movement, Protocol, ProtocolKind, ProtocolSensor};
 
 /// How far somebody walked.
@@ -24,8 +24,8 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     sensor: ProtocolSensor::Skeleton,
     needs_chair: false,
     view: "at the end of the way, at hip height; the whole body must be in view over the way that counts",
-    measures: &[&[DISTANCE]],
-    method: "A walk is a recording in which the pelvis comes more than 1.2 m from where it began; steps are found by the assessment of gait.",
+    measures: &[&[DISTANCE], OF_FOOTFALLS],
+    method: "A walk is a recording in which the pelvis comes more than 1.2 m from where it began; steps are found by the courses of pelvis and feet.",
     fall_risk_rules: &["wfg2022", "speed_slow_ss"],
     source: "",
     movement: Movement::Walked,
@@ -39,7 +39,5 @@ fn find(motion: &Motion) -> Found {
 
 fn measure(_: &Motion, found: &Found) -> Vec<PerformanceMeasure> {
     let Some(walk) = found.walk else { return Vec::new() };
-    let mut distance = measured(DISTANCE, walk.distance_m);
-    distance.reason = "steps and speed are in the assessment's gait".to_owned();
-    vec![distance]
+    vec![measured(DISTANCE, walk.distance_m)]
 }

@@ -2,6 +2,7 @@
 
 use crate::protocol::motion::Motion;
 use crate::protocol::repetitions::Found;
+use crate::protocol::walking::OF_FOOTFALLS;
 use crate::protocol::{Movement, Protocol, ProtocolKind, ProtocolSensor};
 
 /// Walk with a walker.
@@ -18,7 +19,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     sensor: ProtocolSensor::DepthWalker,
     needs_chair: false,
     view: "on the walker, looking back and down at the legs",
-    measures: &[],
+    measures: &[OF_FOOTFALLS],
     method: "Steps are found in the depth images by the assessment of gait; there are no repetitions of angles.",
     fall_risk_rules: &[],
     source: "",
