@@ -20,7 +20,7 @@ fn a_captured_walk_is_measured_from_every_side_through_the_error_of_a_kinect() {
     let motion = sources[0].read().unwrap().recording.skeleton.unwrap();
     for row in rows(&captured(&motion, 5)).iter().filter(|row| row.method == "footfalls") {
         assert_eq!((row.n_walks[1], row.n_contacts[0], row.n_contacts[2]), (0, row.n_contacts[1], 0), "{row:?}");
-        assert!(row.step_time_s[1] < 0.010 && row.worst_step_time_s < 0.020, "{row:?}");
+        assert!(row.step_time_s[1] < 0.010 && row.worst_step_time_s < 0.030, "{row:?}");
         assert!(row.step_length_m[1] < 0.005 && row.speed[1] < 0.02, "{row:?}");
     }
 }

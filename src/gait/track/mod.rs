@@ -57,7 +57,8 @@ pub(super) fn footfalls(track: &JointTrack) -> Footfalls {
     let mut found = Footfalls { contacts: Vec::new(), kind: Stepping::NoLegs, has_backward: false };
     let Some(mut legs) = Legs::of(track) else { return found };
     found.kind = Stepping::None;
-    let walks_of = |legs: &Legs| walking::walks(legs).into_iter().filter(|walk| is_walk(walk)).collect::<Vec<_>>();
+    let walks_of =
+        |legs: &Legs| walking::walks(legs).into_iter().filter(|walk| is_walk(legs, walk)).collect::<Vec<_>>();
     let mut walks = walks_of(&legs);
     if let Some(level) = slope(&walks).and_then(|slope| Legs::of(&levelled(track, slope))) {
         walks = walks_of(&level);
@@ -119,15 +120,24 @@ fn levelled(track: &JointTrack, slope: Vector2<f64>) -> JointTrack {
     level
 }
 
-/// True of contacts whose strides go somewhere.
-fn is_walk(walk: &[WalkContact]) -> bool {
+/// True of contacts between which both feet go somewhere. In a lunge one foot stays where it is.
+fn is_walk(legs: &Legs, walk: &[WalkContact]) -> bool {
     if walk.len() < FEWEST_CONTACTS {
         return false;
     }
-    let mut strides: Vec<f64> =
-        (2..walk.len()).filter_map(|i| Some(stride(walk, i)?.dot(&walk[i].direction))).collect();
-    strides.sort_unstable_by(f64::total_cmp);
-    strides.get(strides.len() / 2).is_some_and(|stride| *stride >= SHORTEST_STRIDE_M)
+    let own = |i: usize| Some(stride(walk, i)?.dot(&walk[i].direction));
+    // The other foot at the contacts around its own one: where it was, and where it has gone.
+    let other = |i: usize| {
+        let ankle = &legs.ankles[Legs::index(walk[i].side.opposite())];
+        let at = |i: usize| ankle.get(walk[i].node.round() as usize).copied().flatten().map(|moving| moving.place);
+        Some((at(i)? - at(i - 2)?).dot(&walk[i].direction))
+    };
+    let goes = |way: &dyn Fn(usize) -> Option<f64>| {
+        let mut ways: Vec<f64> = (2..walk.len()).filter_map(way).collect();
+        ways.sort_unstable_by(f64::total_cmp);
+        ways.get(ways.len() / 2).is_some_and(|way| *way >= SHORTEST_STRIDE_M)
+    };
+    goes(&own) && goes(&other)
 }
 
 /// The stride that ends with contact `i`.

@@ -103,7 +103,9 @@ fn a_camera_that_looks_down_and_does_not_know_it_changes_no_length() {
         *position = (tilt * Vector3::from(*position).map(f64::from)).map(|value| value as f32).into();
     }
     for name in ["step_length_m", "stride_length_m", "usual_speed_mps"] {
-        near(value(&tilted, name), value(&level, name).unwrap(), 0.003);
+        // Half a percent; the tilt alone would take away 3.4 %.
+        let level = value(&level, name).unwrap();
+        near(value(&tilted, name), level, 0.005 * level);
     }
 }
 
@@ -111,8 +113,8 @@ fn a_camera_that_looks_down_and_does_not_know_it_changes_no_length() {
 fn lost_frames_lower_the_coverage_of_their_steps_and_those_do_not_count() {
     let mut walk = track(9.0, walker, 0.0);
     let n = walk.joints.len();
-    // Every other frame of a second without the right ankle; what is left can be bridged.
-    for t in (120..150).step_by(2) {
+    // Every third frame of 1.5 s without the right ankle; what is left can be bridged.
+    for t in (120..165).step_by(3) {
         walk.positions_m[t * n + 3] = [f32::NAN; 3];
     }
     let found = measures_of_track(&walk);

@@ -28,6 +28,8 @@ const CONTACT_SHARE: f64 = 0.16;
 /// between what captured and what simulated walks have.
 const RELEASE_SHARE: f64 = 0.37;
 const RELEASE_ANKLE_SHARE: f64 = 0.5;
+/// Least speed of an ankle that swings, as share of the pelvis' speed; on average a foot in the air has 2.5 times that speed.
+const SWING_SPEED: f64 = 1.5;
 /// Time after the extremum in which a foot may still become slow, seconds: the heel of the other foot rises already.
 const LATE_CONTACT_S: f64 = 0.15;
 /// Part of the time from a contact to the next one in which the foot is flat.
@@ -145,6 +147,11 @@ fn contacts(legs: &Legs, extrema: &[(usize, Side)], run: std::ops::Range<usize>)
         let before = i.checked_sub(1).map_or(run.start, |i| extrema[i].0);
         let ankle = &legs.ankles[Legs::index(side)];
         let fastest = |point: &[Option<Moving>]| (before..at).filter_map(|k| speed(legs, point, k)).fold(0.0, f64::max);
+        // A track that begins within a stance shows no swing that could end.
+        let body = progress(&legs.way[at]).map_or(0.0, |(_, speed)| speed);
+        if fastest(ankle) < SWING_SPEED * body {
+            continue;
+        }
         let limit = CONTACT_SHARE * fastest(ankle);
         let excess = |k: usize| Some(speed(legs, ankle, k)? - limit);
         let late = at..(at + late_nodes).min(run.end - 1);
