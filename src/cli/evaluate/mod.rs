@@ -5,6 +5,7 @@ mod fusion;
 mod hinge;
 mod noise;
 mod orientation;
+mod protocols;
 mod sources;
 mod table;
 mod verdict_table;
@@ -44,6 +45,8 @@ enum What {
     Hinge(hinge::HingeArgs),
     /// Orientation filters of inertial units against optical orientation
     Orientation(orientation::OrientationArgs),
+    /// Recognition, repetitions and times of exercises and tests, real and simulated
+    Protocols(protocols::ProtocolArgs),
     /// Legs of a walker's user from depth images against the truth of simulated walks
     Walker(walker::WalkerArgs),
 }
@@ -120,6 +123,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         What::Fusion(args) => fusion::run(args, &mut std::io::stdout().lock()),
         What::Hinge(args) => hinge::run(args, &mut std::io::stdout().lock()),
         What::Orientation(args) => orientation::run(args, &mut std::io::stdout().lock()),
+        What::Protocols(args) => protocols::run(args, &mut std::io::stdout().lock()),
         What::Walker(args) => walker::run(args, &mut std::io::stdout().lock()),
     }
 }
