@@ -47,7 +47,7 @@ pub struct Repetition {
     pub side: Option<Side>,
     /// When the movement began, seconds from the recording's first frame.
     pub start_s: f64,
-    /// When it was farthest from where it began.
+    /// Middle of the time in which it was nearly as far from where it began as it got (four fifths of the way).
     pub peak_s: f64,
     /// When it had come back.
     pub end_s: f64,

@@ -10,6 +10,7 @@ pub mod hinge;
 pub mod joint_angles;
 pub mod orientation;
 pub mod overview;
+pub mod protocols;
 pub mod reference;
 pub mod rows;
 pub mod segment_lengths;

@@ -25,4 +25,12 @@ impl TrialSource {
     pub fn new(name: impl Into<String>, load: impl Fn() -> Result<Trial, String> + Send + Sync + 'static) -> Self {
         Self { name: name.into(), load: Box::new(load) }
     }
+
+    /// Reads or makes the trial.
+    ///
+    /// # Errors
+    /// A sentence that says why it cannot be had.
+    pub fn load(&self) -> Result<Trial, String> {
+        (self.load)()
+    }
 }

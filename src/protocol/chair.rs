@@ -7,7 +7,7 @@
 use super::look::Look;
 use super::motion::{INTERVAL_S, Motion};
 use super::repetitions::{Angle, Found, repetition};
-use super::transition::{Excursion, Least, Transition, derivative, transitions};
+use super::transition::{EDGE_SPEED, Excursion, Least, Transition, derivative, transitions};
 
 /// Least change of mean knee flexion in a rise, degrees.
 const LEAST: Least = Least::of(30.0);
@@ -74,13 +74,13 @@ pub fn rises(motion: &Motion) -> Vec<Rise> {
         if !sits(&Look::at(motion, seated)) {
             continue;
         }
-        let moves = |i: usize| -speed[i] > 0.15 * way.peak_speed;
+        let moves = |i: usize| -speed[i] > EDGE_SPEED * way.peak_speed;
         let begins_within = before.is_none() && way.start <= 1 && moves(way.start);
         let stands = knee[way.end] <= low + STANDING * (high - low);
         let half = 0.5 * (knee[way.from] + knee[way.to]);
         rises.push(Rise {
             way: *way,
-            onset: onset(motion, way),
+            onset: onset(motion, way, before.map_or(0, |before| before.end)),
             halfway: (way.from..=way.to).find(|&i| knee[i] <= half).unwrap_or(way.to),
             is_complete: !begins_within && stands,
             lowering_before: before,
@@ -106,14 +106,15 @@ pub fn bends_both(look: &Look) -> bool {
         let stay = places.foot_rise.iter().all(|rise| *rise < 0.2) && places.foot_forward.iter().all(|way| *way < 0.45);
         stay && places.feet_apart[0].abs() < 0.3 && places.pelvis_forward < 0.25
     });
-    both && thighs && together && feet
+    both && thighs && together && feet && look.knee_alternation < 0.8 * 0.5 * (left + right)
 }
 
 /// Where a rise begins, the lean of the trunk that prepares it included.
-fn onset(motion: &Motion, way: &Transition) -> usize {
+fn onset(motion: &Motion, way: &Transition, seated_from: usize) -> usize {
     let speed = derivative(&motion.trunk_flexion, INTERVAL_S);
     let reach = (LONGEST_LEAN_S / INTERVAL_S) as usize;
-    let first = way.start.saturating_sub(reach);
+    // The lean of sitting down is another one.
+    let first = way.start.saturating_sub(reach).max(seated_from.min(way.start));
     let around = first..=way.start;
     let fastest = around.clone().map(|i| speed[i]).filter(|v| v.is_finite()).fold(0.0, f64::max);
     // Back from the last node at which the trunk still leans at speed.

@@ -17,10 +17,12 @@ pub struct Look {
     pub excursion: Excursion,
     /// Time from start to end, seconds.
     pub duration_s: f64,
-    /// Knee flexion at the base and its change, degrees.
+    /// Knee flexion at the base, degrees.
     pub knee: [f64; 2],
     /// Change of knee flexion, degrees.
     pub knee_change: [f64; 2],
+    /// Range of the difference of the knees within it, degrees: feet in turn, when it is as large as the change.
+    pub knee_alternation: f64,
     /// Thigh against hanging, at the peak, degrees.
     pub thigh: [f64; 2],
     /// Change of the thigh, degrees.
@@ -66,10 +68,14 @@ impl Look {
         };
         let both = |values: &[Vec<f64>; 2], of: &dyn Fn(&[f64]) -> f64| [of(&values[0]), of(&values[1])];
         let change = |values: &[f64]| values[peak] - base(values);
+        let differences = (start..=end).map(|i| motion.knee[0][i] - motion.knee[1][i]).filter(|d| d.is_finite());
+        let [least, most] =
+            differences.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], d| [least.min(d), most.max(d)]);
         Self {
             excursion,
             duration_s: (end - start) as f64 * INTERVAL_S,
             knee: both(&motion.knee, &base),
+            knee_alternation: most - least,
             knee_change: both(&motion.knee, &change),
             thigh: both(&motion.thigh, &|values| values[peak]),
             thigh_change: both(&motion.thigh, &change),

@@ -8,6 +8,8 @@
 
 pub mod catalogue;
 pub mod chair;
+#[cfg(test)]
+mod chair_tests;
 mod info;
 pub mod look;
 pub mod measures;

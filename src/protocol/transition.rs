@@ -6,7 +6,7 @@
 //! ```text
 //! least change that counts      P = max(floor, share (max − min))
 //! core of a way a → b           from the last 20 % level before the first 80 % level
-//! its start and end             outwards from the core while the speed exceeds 15 % of the way's largest
+//! its start and end             outwards from the core while the speed exceeds 25 % of the way's largest
 //! ```
 //!
 //! The rule on speed, and not on level, keeps the start of a rise where it is although the angle drifts while somebody sits.
@@ -33,7 +33,10 @@ impl Least {
 const CORE: [f64; 2] = [0.2, 0.8];
 
 /// Share of the largest speed that a way has at its start and end.
-const EDGE_SPEED: f64 = 0.15;
+pub const EDGE_SPEED: f64 = 0.25;
+
+/// Share of the way out from which on an excursion is nearly as far as it gets.
+const NEARLY: f64 = 0.8;
 
 /// Share of an excursion that must be seen on both sides of its peak: one that begins or ends nearer to the peak, at the
 /// signal's edge, is cut off.
@@ -61,7 +64,7 @@ pub struct Transition {
 pub struct Excursion {
     /// First sample of the way out; the signal's first sample when it began before.
     pub start: usize,
-    /// Sample farthest from the base.
+    /// Middle of the samples that are nearly farthest from the base.
     pub peak: usize,
     /// Last sample of the way back; the signal's last sample when it ends after.
     pub end: usize,
@@ -160,15 +163,15 @@ pub fn excursions(values: &[f64], interval_s: f64, least: Least) -> Vec<Excursio
     found
 }
 
-/// Middle of the time at which the signal is as high as at its turning point, to a twentieth of the way: a plateau has no
-/// highest sample that means anything.
+/// Middle of the time in which the signal is nearly as high as it gets: a plateau with two bumps has no highest sample that
+/// means anything.
 fn highest(values: &[f64], out: &Transition, back: &Transition) -> usize {
-    let near = values[out.to] - 0.05 * out.change;
+    let near = values[out.to] - (1.0 - NEARLY) * out.change;
     let is_high = |i: &usize| values[*i] >= near;
     let first = (out.start..=back.end).find(is_high).unwrap_or(out.to);
     let last = (out.start..=back.end).rev().find(is_high).unwrap_or(out.to);
     let middle = first + (last - first) / 2;
-    if values[middle] >= near { middle } else { out.to }
+    if is_high(&middle) { middle } else { out.to }
 }
 
 /// Whether the signal's edge takes away part of an excursion: one of its ends is much higher than the other, and lies at the
@@ -211,10 +214,10 @@ mod tests {
             for (i, excursion) in found.iter().enumerate() {
                 assert!(excursion.is_complete);
                 let start_s = 1.0 + 3.0 * i as f64;
-                // A cosine has 15 % of its largest speed a twentieth of its period after it began.
-                assert!((excursion.start as f64 * INTERVAL_S - start_s - 0.05).abs() < 0.06, "{excursion:?}");
+                // A cosine has 25 % of its largest speed a twenty-fifth of its period after it began.
+                assert!((excursion.start as f64 * INTERVAL_S - start_s - 0.08).abs() < 0.05, "{excursion:?}");
                 assert!((excursion.peak as f64 * INTERVAL_S - start_s - 1.0).abs() < 0.03, "{excursion:?}");
-                assert!((excursion.end as f64 * INTERVAL_S - start_s - 1.95).abs() < 0.06, "{excursion:?}");
+                assert!((excursion.end as f64 * INTERVAL_S - start_s - 1.92).abs() < 0.05, "{excursion:?}");
             }
         }
     }

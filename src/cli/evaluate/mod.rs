@@ -6,6 +6,7 @@ mod gait;
 mod hinge;
 mod noise;
 mod orientation;
+mod protocols;
 mod sources;
 mod table;
 mod verdict_table;
@@ -47,6 +48,8 @@ enum What {
     Hinge(hinge::HingeArgs),
     /// Orientation filters of inertial units against optical orientation
     Orientation(orientation::OrientationArgs),
+    /// Recognition, repetitions and times of exercises and tests, real and simulated
+    Protocols(protocols::ProtocolArgs),
     /// Legs of a walker's user from depth images against the truth of simulated walks
     Walker(walker::WalkerArgs),
 }
@@ -124,6 +127,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         What::Gait(args) => gait::run(args, &mut std::io::stdout().lock()),
         What::Hinge(args) => hinge::run(args, &mut std::io::stdout().lock()),
         What::Orientation(args) => orientation::run(args, &mut std::io::stdout().lock()),
+        What::Protocols(args) => protocols::run(args, &mut std::io::stdout().lock()),
         What::Walker(args) => walker::run(args, &mut std::io::stdout().lock()),
     }
 }
