@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The floor comes from the background image, or from the first frames; nothing is set by hand. The legs' shape is
-//! estimated from the first seconds in which legs are seen ([`tracker::calibrate`]); then each frame is tracked
+//! estimated from the first seconds in which legs are seen ([`shape_fit::calibrate`]); then each frame is tracked
 //! ([`tracker`]) and smoothed ([`smoother`]). Images are read one by one, so memory does not grow with the recording but
 //! by the poses.
 //!
@@ -18,6 +18,7 @@ pub mod foreground;
 pub mod leg_model;
 pub mod paper;
 mod report;
+pub mod shape_fit;
 pub mod smoother;
 pub mod static_scene;
 pub mod steps;
@@ -36,14 +37,15 @@ use crate::recording::depth::{DepthImage, DepthReader, DepthUnit};
 use crate::recording::side_camera::{SideCamera, SideImages};
 use floor::Floor;
 use foreground::{Foreground, Preparation, Region};
-use leg_model::{LegPoint, LegSegment, POINTS, ShapeVector, adult_shape, adult_shape_deviation, point_of};
+use leg_model::{LegPoint, LegSegment, POINTS, ShapePrior, ShapeVector, point_of};
 use nalgebra::Vector3;
 use paper::PaperRun;
+use shape_fit::calibrate;
 use smoother::{SmoothedFrame, Smoother};
 use static_scene::StaticScene;
 use std::io::Read;
 use surface_fit::SEGMENTS;
-use tracker::{Tracker, calibrate, visibility};
+use tracker::{Tracker, visibility};
 use two_legs::TwoLegs;
 
 /// Frames with two legs that the shape is estimated from.
@@ -385,7 +387,7 @@ impl Run {
         let height = self.preparation.floor().camera_height;
         let used = self.waiting.iter().step_by(CALIBRATION_STRIDE);
         let used = used.map(|(time_ns, foreground)| (*time_ns, foreground.points.as_slice()));
-        let shape = calibrate(height, used, (&adult_shape(), &adult_shape_deviation()));
+        let shape = calibrate(height, used, &ShapePrior::people());
         self.tracker = Some((Tracker::new(height, shape), shape));
         for (time_ns, foreground) in std::mem::take(&mut self.waiting) {
             self.track(time_ns, &foreground);

@@ -9,7 +9,7 @@
 //! Derivatives with respect to a, b and both radii are −(1−t) n, −t n, −(1−t), −t with n = (p − c)/|p − c|.
 
 use super::foreground::ForegroundPoint;
-use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, SHAPE, ShapeVector, point_of};
+use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, SHAPE, ShapeVector, point_of, size_of};
 use crate::body::Side;
 use nalgebra::{SMatrix, SVector, Vector3};
 
@@ -38,8 +38,14 @@ const OPEN_ABOVE_HIP: f64 = 0.3;
 /// The middle of a shoe's rear lies this much below the ankle, metres; were a foot's axis to begin at the ankle, the low
 /// upper of the shoe would pull the ankle down.
 const FOOT_DROP: f64 = 0.05;
-/// Least height of the ankle's centre above the floor, metres: 0.039 of stature (Winter) and a shoe's sole.
+/// Height of the ankle's centre above the floor of a standing adult, metres: 0.039 of stature (Winter) and a shoe's sole.
 const ANKLE_HEIGHT: f64 = 0.09;
+/// How much it differs from body to body, and while a foot rolls, metres.
+const ANKLE_SD: f64 = 0.015;
+/// An ankle is not lower than expected by more than this, metres.
+const ANKLE_LOWER: f64 = 0.02;
+/// An ankle that is higher than the other by this much is half as sure to stand, metres.
+const STANDING_APART: f64 = 0.02;
 /// Points higher than this below upright hips are trunk, arms and what hangs from them, metres.
 const BELOW_HIPS: f64 = 0.05;
 /// A foot is wider than high: half the width of its flat part at ankle and toes, metres.
@@ -82,11 +88,12 @@ struct Touch {
 }
 
 fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
+    let size = size_of(shape);
     std::array::from_fn(|s| {
         let (side, segment) = side_and_segment(s);
         let mut start = point_of(pose, side, segment.start());
         if segment == LegSegment::Foot {
-            start.y -= FOOT_DROP;
+            start.y -= FOOT_DROP * size;
         }
         let axis = point_of(pose, side, segment.end()) - start;
         let (_, [first, last]) = segment.shape_indices();
@@ -102,6 +109,11 @@ fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
         };
         Cone { start, axis, inverse_squared_length, range, radii: [shape[first], shape[last]], across }
     })
+}
+
+/// Height of a standing ankle of a body of this size: soles do not grow with the body.
+fn ankle_height(size: f64) -> f64 {
+    ANKLE_HEIGHT * (0.5 + 0.5 * size)
 }
 
 /// Side and segment of a place among the six segments.
@@ -145,7 +157,7 @@ pub fn linearise(
     let mut weights = [0.0; SEGMENTS];
     let mut support = [0.0; SEGMENTS];
     let (mut explained, mut misfit, mut total) = (0.0, 0.0, 0.0);
-    let top = ANKLE_HEIGHT + shape[0] + shape[1] - BELOW_HIPS;
+    let top = ankle_height(size_of(shape)) + shape[0] + shape[1] - BELOW_HIPS;
     for point in points.iter().filter(|point| point.position.y < top) {
         total += point.pixels;
         let Some(touch) = touch(&cones, &point.position) else {
@@ -234,7 +246,7 @@ impl NormalEquations {
             self.add_knee(side, pose);
             self.add_foot(side, pose, shape);
         }
-        self.add_pelvis(pose);
+        self.add_pelvis(pose, size_of(shape));
         self.add_clearance(pose, shape);
     }
 
@@ -285,20 +297,25 @@ impl NormalEquations {
         if sole < 0.0 {
             self.add(sole, FLOOR_SD, &[(toe + 1, 1.0), (POSE + 7, -1.0)]);
         }
-        let lowest = pose[ankle + 1] - ANKLE_HEIGHT;
+        let lowest = pose[ankle + 1] - ankle_height(size_of(shape)) + ANKLE_LOWER;
         if lowest < 0.0 {
             self.add(lowest, FLOOR_SD, &[(ankle + 1, 1.0)]);
         }
+        // One foot stands; the other one does so the more the less it is higher.
+        let other = 3 * LegPoint::Ankle.index(side.opposite());
+        let higher = (pose[ankle + 1] - pose[other + 1]).max(0.0);
+        let share = 1.0 / (1.0 + (higher / STANDING_APART).powi(2));
+        self.add(pose[ankle + 1] - ankle_height(size_of(shape)), ANKLE_SD / share, &[(ankle + 1, 1.0)]);
     }
 
     /// Hips are about level and a pelvis apart, and the user looks at the camera.
-    fn add_pelvis(&mut self, pose: &PoseVector) {
+    fn add_pelvis(&mut self, pose: &PoseVector, size: f64) {
         const WIDTH: f64 = 0.17;
         const WIDTH_SD: f64 = 0.02;
         const LEVEL_SD: f64 = 0.06;
         const ROTATION_SD: f64 = 0.10;
         let [left, right] = Side::BOTH.map(|side| 3 * LegPoint::Hip.index(side));
-        let sds = [(WIDTH, WIDTH_SD), (0.0, LEVEL_SD), (0.0, ROTATION_SD)];
+        let sds = [(WIDTH * size, WIDTH_SD), (0.0, LEVEL_SD), (0.0, ROTATION_SD)];
         for (axis, (expected, sd)) in sds.into_iter().enumerate() {
             let residual = pose[left + axis] - pose[right + axis] - expected;
             self.add(residual, sd, &[(left + axis, 1.0), (right + axis, -1.0)]);
