@@ -8,7 +8,7 @@
 //!
 //! Derivatives with respect to a, b and both radii are −(1−t) n, −t n, −(1−t), −t with n = (p − c)/|p − c|.
 
-use super::foreground::ForegroundPoint;
+use super::foreground::{ForegroundPoint, REFERENCE_FOCAL};
 use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, SHAPE, ShapeVector, point_of, size_of};
 use crate::body::Side;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -27,6 +27,9 @@ const INDEPENDENT_POINTS: f64 = 30.0;
 /// its points count as much it drags the ankle along the shank by 1 to 2 cm (step length on simulated walks: 1.0 cm against
 /// 0.4 cm).
 const SEGMENT_TRUST: [f64; 3] = [10.0, 20.0, 1.0];
+/// Share of a segment of which less is a sliver beside something nearer: of it only an edge is seen, and edges are ragged
+/// and do not tell how far the leg goes on behind.
+pub const SLIVER_SHARE: f64 = 0.35;
 /// How exactly thigh, shank and foot have their lengths, metres: joint centres move in a bent joint, and a foot bends at
 /// the ball when its heel rises.
 const LENGTH_SD: [f64; 3] = [0.008, 0.003, 0.050];
@@ -85,6 +88,12 @@ struct Touch {
     t: f64,
     normal: Vector3<f64>,
     residual: f64,
+}
+
+impl Cone {
+    fn covered_pixels(&self, camera: &Vector3<f64>) -> f64 {
+        covered_pixels(camera, [&self.start, &(self.start + self.axis)], self.radii[0] + self.radii[1])
+    }
 }
 
 fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
@@ -198,7 +207,10 @@ pub fn linearise(
         misfit: misfit / f64::max(total, 1.0),
     };
     for (s, (block, vector)) in blocks.iter().zip(&vectors).enumerate() {
-        let scale = segment_scale(weights[s]) * SEGMENT_TRUST[s % 3];
+        // A thigh is cut off by the image's upper edge, which tells nothing of the part that is seen.
+        let seen =
+            if s % 3 == 0 { 1.0 } else { (weights[s] / (SLIVER_SHARE * cones[s].covered_pixels(camera))).min(1.0) };
+        let scale = segment_scale(weights[s]) * SEGMENT_TRUST[s % 3] * seen * seen;
         let places = places_of_segment(s);
         for r in 0..8 {
             system.gradient[places[r]] += scale * vector[r];
@@ -215,6 +227,14 @@ fn segment_scale(weight: f64) -> f64 {
     // A dense point stands for nine pixels: as many pixels err together.
     let independent = (weight / 30.0).min(INDEPENDENT_POINTS);
     independent / weight.max(1e-9) / (SURFACE_SD * SURFACE_SD)
+}
+
+/// Pixels of a Kinect v1 that a segment between two points would cover; `width` is the sum of its radii, metres.
+pub fn covered_pixels(camera: &Vector3<f64>, ends: [&Vector3<f64>; 2], width: f64) -> f64 {
+    let view = 0.5 * (ends[0] + ends[1]) - camera;
+    let distance = view.norm().max(0.1);
+    let across = (ends[1] - ends[0]).cross(&view).norm() / distance;
+    ((across * width + 0.5 * width * width) * (REFERENCE_FOCAL / distance).powi(2)).max(1.0)
 }
 
 /// Places among the unknowns of a segment's start, end and two radii.
@@ -246,7 +266,7 @@ impl NormalEquations {
             self.add_knee(side, pose);
             self.add_foot(side, pose, shape);
         }
-        self.add_pelvis(pose, size_of(shape));
+        self.add_pelvis(pose, shape);
         self.add_clearance(pose, shape);
     }
 
@@ -308,18 +328,34 @@ impl NormalEquations {
         self.add(pose[ankle + 1] - ankle_height(size_of(shape)), ANKLE_SD / share, &[(ankle + 1, 1.0)]);
     }
 
-    /// Hips are about level and a pelvis apart, and the user looks at the camera.
-    fn add_pelvis(&mut self, pose: &PoseVector, size: f64) {
+    /// Hips are about level and a pelvis apart, above the feet and as high as legs that walk, and the user looks at the
+    /// camera.
+    ///
+    /// Of a straight leg in wide trousers neither knee nor hip is seen, and a leg slides along itself by centimetres.
+    fn add_pelvis(&mut self, pose: &PoseVector, shape: &ShapeVector) {
         const WIDTH: f64 = 0.17;
         const WIDTH_SD: f64 = 0.02;
         const LEVEL_SD: f64 = 0.06;
         const ROTATION_SD: f64 = 0.10;
+        /// How far hips are before or behind the middle of the feet, metres.
+        const AHEAD_SD: f64 = 0.08;
+        /// Height of hips above ankles as a share of a leg's length in walking, and how much it differs, metres.
+        const STRETCH: f64 = 0.955;
+        const HEIGHT_SD: f64 = 0.025;
         let [left, right] = Side::BOTH.map(|side| 3 * LegPoint::Hip.index(side));
-        let sds = [(WIDTH * size, WIDTH_SD), (0.0, LEVEL_SD), (0.0, ROTATION_SD)];
+        let sds = [(WIDTH * size_of(shape), WIDTH_SD), (0.0, LEVEL_SD), (0.0, ROTATION_SD)];
         for (axis, (expected, sd)) in sds.into_iter().enumerate() {
             let residual = pose[left + axis] - pose[right + axis] - expected;
             self.add(residual, sd, &[(left + axis, 1.0), (right + axis, -1.0)]);
         }
+        let [left_ankle, right_ankle] = Side::BOTH.map(|side| 3 * LegPoint::Ankle.index(side));
+        let ahead = 0.5 * (pose[left + 2] + pose[right + 2] - pose[left_ankle + 2] - pose[right_ankle + 2]);
+        let middle = [(left + 2, 0.5), (right + 2, 0.5), (left_ankle + 2, -0.5), (right_ankle + 2, -0.5)];
+        self.add(ahead, AHEAD_SD, &middle);
+        let upright = ankle_height(size_of(shape)) + STRETCH * (shape[0] + shape[1]);
+        let height = 0.5 * (pose[left + 1] + pose[right + 1]);
+        let derivatives = [(left + 1, 0.5), (right + 1, 0.5), (POSE, -STRETCH), (POSE + 1, -STRETCH)];
+        self.add(height - upright, HEIGHT_SD, &derivatives);
     }
 
     /// Knees and ankles do not go through each other.

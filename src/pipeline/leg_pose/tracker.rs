@@ -7,7 +7,7 @@
 
 use super::foreground::ForegroundPoint;
 use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, ShapeVector, point_of, set_point};
-use super::surface_fit::{NormalEquations, SEGMENTS, linearise};
+use super::surface_fit::{NormalEquations, SEGMENTS, covered_pixels, linearise};
 use super::two_legs::TwoLegs;
 use crate::body::Side;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -304,22 +304,11 @@ fn upright_leg(points: &[ForegroundPoint], camera: &Vector3<f64>, shape: &ShapeV
 }
 
 /// How much of a segment that faces the camera was seen, 0 to 1: the pixels it explains of those it would cover.
-pub fn visibility(
-    fit: &FrameFit,
-    shape: &ShapeVector,
-    side: Side,
-    segment: LegSegment,
-    focal_length: f64,
-    camera_height: f64,
-) -> f64 {
+pub fn visibility(fit: &FrameFit, shape: &ShapeVector, side: Side, segment: LegSegment, camera_height: f64) -> f64 {
     let pose = fit.belief.pose();
     let start = point_of(&pose, side, segment.start());
     let end = point_of(&pose, side, segment.end());
     let (_, [first, last]) = segment.shape_indices();
-    let view = 0.5 * (start + end) - Vector3::new(0.0, camera_height, 0.0);
-    let distance = view.norm().max(0.1);
-    let across = (end - start).cross(&view).norm() / distance;
-    let width = shape[first] + shape[last];
-    let covered = (across * width + 0.5 * width * width) * (focal_length / distance).powi(2);
-    (fit.support[3 * side as usize + segment as usize] / covered.max(1.0)).min(1.0)
+    let covered = covered_pixels(&Vector3::new(0.0, camera_height, 0.0), [&start, &end], shape[first] + shape[last]);
+    (fit.support[3 * side as usize + segment as usize] / covered).min(1.0)
 }

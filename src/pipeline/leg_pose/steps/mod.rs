@@ -26,6 +26,8 @@ const MIN_COVERAGE: f64 = 0.8;
 const TURN: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// Way of a standing foot, metres, on which a bend is half believed: a bend of 2 mm on 0.1 m is 9 degrees.
 const NOTHING_SURE: f64 = 0.1;
+/// Standard deviation of a well-seen standing foot about its path, metres.
+const PATH_SD: f64 = 0.004;
 /// 97.5 % point of the normal distribution.
 const NORMAL_975: f64 = 1.96;
 /// What differs from body to body between tracked ankles and joints, and does not cancel between the feet: standard
@@ -232,8 +234,10 @@ fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
         .iter()
         .map(|swing| {
             let standing = swing.side.opposite() as usize;
-            let path: Vec<Vector2<f64>> =
-                frames[swing.toe_off..=swing.heel_strike].iter().map(|frame| frame.ankle[standing]).collect();
+            let path: Vec<(Vector2<f64>, f64)> = frames[swing.toe_off..=swing.heel_strike]
+                .iter()
+                .map(|frame| (frame.ankle[standing], 1.0 / (frame.ankle_sd[standing].x.powi(2) + PATH_SD * PATH_SD)))
+                .collect();
             bend(&path)
         })
         .collect();
@@ -256,22 +260,23 @@ fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
         .collect()
 }
 
-/// Change of direction along a path and its extent along z: the parabola x(z) of least squares.
-fn bend(path: &[Vector2<f64>]) -> (f64, f64) {
-    let n = path.len() as f64;
-    let mean = path.iter().sum::<Vector2<f64>>() / n;
-    let (first, last) = (path[0].y, path[path.len() - 1].y);
-    let way = (last - first).abs();
+/// Change of direction along a path of weighted places and its extent along z as far as it is sure: the parabola x(z) of
+/// least squares.
+fn bend(path: &[(Vector2<f64>, f64)]) -> (f64, f64) {
+    let total: f64 = path.iter().map(|(_, weight)| weight).sum();
+    let mean = path.iter().map(|(place, weight)| place * *weight).sum::<Vector2<f64>>() / total;
+    let way = path[path.len() - 1].0.y - path[0].0.y;
     let mut matrix = Matrix3::zeros();
     let mut vector = Vector3::zeros();
-    for place in path {
+    for (place, weight) in path {
         let z = place.y - mean.y;
         let row = Vector3::new(1.0, z, z * z);
-        matrix += row * row.transpose();
-        vector += row * (place.x - mean.x);
+        matrix += row * row.transpose() * *weight;
+        vector += row * (place.x - mean.x) * *weight;
     }
+    let sure = total * PATH_SD * PATH_SD / path.len() as f64;
     match matrix.lu().solve(&vector) {
-        Some(parabola) if way > 0.0 => (2.0 * parabola[2] * (last - first), way),
+        Some(parabola) if way != 0.0 => (2.0 * parabola[2] * way, way.abs() * sure.sqrt()),
         _ => (0.0, 0.0),
     }
 }
