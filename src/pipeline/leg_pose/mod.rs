@@ -60,7 +60,7 @@ const FLOOR_PATIENCE: usize = 30;
 const SEEN_SHARE: f64 = 0.08;
 /// How far a leg may be from where it is guessed to be when it is hidden, along the axes of `floor`: standard deviations,
 /// metres; from simulated walks in which one leg hides the other.
-const HIDDEN_SD: Vector3<f64> = Vector3::new(0.04, 0.02, 0.02);
+const HIDDEN_SD: Vector3<f64> = Vector3::new(0.04, 0.02, 0.03);
 
 /// Depth images one by one, with what is known of their camera.
 pub trait DepthFrames {

@@ -17,9 +17,9 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 const NORMAL_975: f64 = 1.96;
 /// What differs from body to body between a fitted point and the joint: standard deviation of hip, knee, ankle and toe,
 /// metres; from simulated walks.
-const BODY_SD: [f64; 4] = [0.04, 0.025, 0.012, 0.020];
+const BODY_SD: [f64; 4] = [0.04, 0.025, 0.015, 0.020];
 /// What of it does not cancel between the ankles, along x, y and z of `floor`, metres.
-const APART_BODY_SD: Vector3<f64> = Vector3::new(0.004, 0.008, 0.006);
+const APART_BODY_SD: Vector3<f64> = Vector3::new(0.006, 0.008, 0.008);
 /// Points on neither leg, as a share of the foreground, from which on something else is in sight.
 const FOREIGN_SHARE: f64 = 0.35;
 /// Share of pixels as in the background below which the background is of another place. A person behind a walker hides

@@ -42,7 +42,7 @@ const OPEN_ABOVE_HIP: f64 = 0.3;
 /// upper of the shoe would pull the ankle down.
 const FOOT_DROP: f64 = 0.05;
 /// Height of the ankle's centre above the floor of a standing adult, metres: 0.039 of stature (Winter) and a shoe's sole.
-const ANKLE_HEIGHT: f64 = 0.09;
+const ANKLE_HEIGHT: f64 = 0.095;
 /// How much it differs from body to body, and while a foot rolls, metres.
 const ANKLE_SD: f64 = 0.015;
 /// An ankle is not lower than expected by more than this, metres.
@@ -210,7 +210,7 @@ pub fn linearise(
         // A thigh is cut off by the image's upper edge, which tells nothing of the part that is seen.
         let seen =
             if s % 3 == 0 { 1.0 } else { (weights[s] / (SLIVER_SHARE * cones[s].covered_pixels(camera))).min(1.0) };
-        let scale = segment_scale(weights[s]) * SEGMENT_TRUST[s % 3] * seen * seen;
+        let scale = segment_scale(weights[s]) * SEGMENT_TRUST[s % 3] * seen;
         let places = places_of_segment(s);
         for r in 0..8 {
             system.gradient[places[r]] += scale * vector[r];

@@ -32,7 +32,7 @@ const PATH_SD: f64 = 0.004;
 const NORMAL_975: f64 = 1.96;
 /// What differs from body to body between tracked ankles and joints, and does not cancel between the feet: standard
 /// deviation along and across by the definitions of a step, metres; from simulated walks.
-const ANKLE_BODY_SD: [f64; 2] = [0.007, 0.004];
+const ANKLE_BODY_SD: [f64; 2] = [0.009, 0.006];
 /// See [`ANKLE_BODY_SD`].
 const PRINT_BODY_SD: [f64; 2] = [0.012, 0.007];
 
@@ -252,7 +252,10 @@ fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
             let around = n.saturating_sub(1)..(n + 2).min(walk.len());
             let (sum, weight) = around.fold((0.0, 0.0), |(sum, total), k| {
                 let (angle, way) = bends[k];
-                (sum + angle * step_share(k) * way * way, total + way * way)
+                // Its own twice, so that both feet count alike: as one leg passes behind the other its path bends to its
+                // own side, and a turn bends both to one side.
+                let weight = way * way * if k == n { 2.0 } else { 1.0 };
+                (sum + angle * step_share(k) * weight, total + weight)
             });
             // A step of a few centimetres bends by chance.
             if weight > 0.0 { sum / weight * (weight / (weight + NOTHING_SURE * NOTHING_SURE)) } else { 0.0 }
