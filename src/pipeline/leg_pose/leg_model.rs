@@ -144,3 +144,30 @@ pub fn size_of(shape: &ShapeVector) -> f64 {
     let adult = adult_shape();
     (shape[0] + shape[1]) / (adult[0] + adult[1])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn legs_that_are_smaller_as_a_whole_are_likelier_than_legs_with_one_bone_as_much_shorter() {
+        let prior = ShapePrior::people();
+        let surprise = |change: ShapeVector| (prior.information * change).dot(&change);
+        let smaller = surprise(prior.mean * -0.2);
+        let mut short = ShapeVector::zeros();
+        short[1] = -0.2 * prior.mean[1];
+        // A fifth of the size is little more than one standard deviation of 17 %.
+        assert!((1.0..2.0).contains(&smaller), "{smaller}");
+        assert!(surprise(short) > 8.0 * smaller, "{} {smaller}", surprise(short));
+        assert!(prior.information.cholesky().is_some());
+    }
+
+    #[test]
+    fn a_shape_within_bounds_stays_and_one_beyond_is_drawn_to_them() {
+        let prior = ShapePrior::people();
+        assert_eq!(prior.bounded(prior.mean * 0.6), prior.mean * 0.6);
+        let tiny = prior.bounded(prior.mean * 0.1);
+        assert_eq!((tiny[0], tiny[3]), (0.5 * prior.mean[0], 0.4 * prior.mean[3]));
+        assert!((size_of(&(prior.mean * 0.7)) - 0.7).abs() < 1e-12);
+    }
+}

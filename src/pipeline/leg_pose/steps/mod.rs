@@ -87,27 +87,46 @@ fn swings(frames: &[FeetFrame], phases: &[Phase]) -> Vec<Swing> {
         }
         let Phase::Swing { side, backward } = phases[begin] else { continue };
         let run = begin..k;
-        // A swing at either end of the recording is cut off: its contact was not seen.
-        if begin == 0 || k == phases.len() {
+        // Of a swing at the beginning nobody knows when it began; at the end its contact is known when the foot has
+        // come to rest.
+        if begin == 0 {
             continue;
         }
+        let heel_strike = if k < phases.len() { Some(k) } else { rest(frames, side, run.clone()) };
+        let Some(heel_strike) = heel_strike else { continue };
         let relative = |n: usize| frames[n].ankle[side as usize] - frames[n].ankle[side.opposite() as usize];
-        let way = (relative(k) - relative(begin)).y.abs();
-        let time = frames[k].time - frames[begin].time;
-        let seen = frames[begin..k].iter().filter(|f| f.seen).count();
-        if way >= MIN_SWING && SWING_TIME.contains(&time) && 2 * seen >= k - begin {
-            swings.push(Swing { side, backward, toe_off: toe_off(frames, side, run), heel_strike: k });
+        let way = (relative(heel_strike) - relative(begin)).y.abs();
+        let time = frames[heel_strike].time - frames[begin].time;
+        let seen = frames[begin..heel_strike].iter().filter(|f| f.seen).count();
+        if way >= MIN_SWING && SWING_TIME.contains(&time) && 2 * seen >= heel_strike - begin {
+            swings.push(Swing { side, backward, toe_off: toe_off(frames, side, run), heel_strike });
         }
     }
     swings
 }
 
+/// The frame in which a foot that swings until the last frame has come to rest against the other one.
+fn rest(frames: &[FeetFrame], side: Side, swing: std::ops::Range<usize>) -> Option<usize> {
+    /// Frames that it must rest for, so that it is not the slow beginning of another swing.
+    const RESTING: usize = 2;
+    let (speed, fastest) = speeds(frames, side, &swing);
+    let last = swing.clone().rfind(|k| speed(*k) >= TOE_OFF_SPEED * fastest)?;
+    (last + RESTING < swing.end).then_some(last + 1)
+}
+
 /// The frame in which the toes leave the floor: the ankle moves before, while the heel rises over the standing toes, but
 /// not as fast as in the air.
 fn toe_off(frames: &[FeetFrame], side: Side, swing: std::ops::Range<usize>) -> usize {
-    let speed = |k: usize| (frames[k].velocity[side as usize].y - frames[k].velocity[side.opposite() as usize].y).abs();
-    let fastest = swing.clone().map(speed).fold(0.0, f64::max);
+    let (speed, fastest) = speeds(frames, side, &swing);
     swing.clone().find(|k| speed(*k) >= TOE_OFF_SPEED * fastest).unwrap_or(swing.start)
+}
+
+/// Speed of a swinging foot against the other one, m/s, and its greatest in the swing.
+fn speeds(frames: &[FeetFrame], side: Side, swing: &std::ops::Range<usize>) -> (impl Fn(usize) -> f64, f64) {
+    let speed = move |k: usize| {
+        (frames[k].velocity[side as usize].y - frames[k].velocity[side.opposite() as usize].y).abs()
+    };
+    (speed, swing.clone().map(speed).fold(0.0, f64::max))
 }
 
 /// Swings that follow each other without a rest, in one direction.
