@@ -109,22 +109,27 @@ fn true_contacts(simulation: &WalkerSimulation) -> Vec<(Side, f64)> {
     contacts
 }
 
-#[test]
-fn a_walk_gives_the_true_ankles_and_steps_and_no_step_that_did_not_happen() {
-    let found = assessed(read(&WALK_BYTES)).unwrap();
+/// Mean distance of the ankles that were found from the true ones, metres.
+fn mean_ankle_error(simulation: &WalkerSimulation, found: &Assessment) -> f64 {
     let mut errors = Vec::new();
-    for k in 0..WALK.len() {
-        let truth = WALK.truth(k);
+    for k in 0..simulation.len() {
+        let truth = simulation.truth(k);
         for side in Side::BOTH {
             let ankle = truth.legs[side as usize].ankle;
             let estimate = ["x", "y", "z"].map(|axis| {
                 let name = format!("{}_ankle_{axis}_m", side.name());
-                f64::from(series(&found, &name).value[k])
+                f64::from(series(found, &name).value[k])
             });
             errors.push((ankle - nalgebra::Point3::from(estimate)).norm());
         }
     }
-    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    errors.iter().sum::<f64>() / errors.len() as f64
+}
+
+#[test]
+fn a_walk_gives_the_true_ankles_and_steps_and_no_step_that_did_not_happen() {
+    let found = assessed(read(&WALK_BYTES)).unwrap();
+    let mean = mean_ankle_error(&WALK, &found);
     assert!(mean < 0.025, "ankles: {mean} m");
 
     let gait = found.gait.as_ref().unwrap();
@@ -146,6 +151,21 @@ fn a_walk_gives_the_true_ankles_and_steps_and_no_step_that_did_not_happen() {
     }
     assert!(codes(&found).contains("in_evaluation"));
     assert!(found.quality.coverage > 0.8, "{}", found.quality.coverage);
+}
+
+#[test]
+fn legs_of_every_size_are_followed_before_a_camera_that_is_mounted_for_adults() {
+    for stature_m in [1.2, 2.0] {
+        let mut settings = WalkerSettings::of_seed(Course::Straight, 2).with_speed(0.6);
+        settings = WalkerSettings { duration_s: 4.0, rate_hz: 15.0, stature_m, ..settings };
+        settings.clothes.flare_m = if stature_m > 1.7 { 0.03 } else { 0.0 };
+        let simulation = WalkerSimulation::new(&settings, trousers()).unwrap();
+        let found = assessed(read(&recorded(&simulation))).unwrap();
+        let mean = mean_ankle_error(&simulation, &found);
+        assert!(mean < 0.03, "{stature_m} m: ankles {mean} m");
+        assert!(!codes(&found).contains("implausible_lengths"), "{stature_m} m: {:?}", codes(&found));
+        assert_eq!(found.quality.events, [], "{stature_m} m");
+    }
 }
 
 #[test]

@@ -28,7 +28,7 @@ const BLOCKED_SHARE: f64 = 0.7;
 /// Share of the image without depth from which on nothing is seen.
 const BLIND_SHARE: f64 = 0.97;
 /// The focal length for which a pixel counts as one, pixels: that of a Kinect v1.
-const REFERENCE_FOCAL: f64 = 580.0;
+pub(super) const REFERENCE_FOCAL: f64 = 580.0;
 
 /// The part of space in which legs are looked for, in `sensor`, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@
 //! share: a trouser leg that slides over the knee then bends the estimate by millimetres, not the whole leg.
 
 use crate::body::Side;
-use nalgebra::{SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
 /// Points of one leg.
 pub const POINTS_OF_LEG: usize = 4;
@@ -96,7 +96,78 @@ pub fn adult_shape() -> ShapeVector {
     ShapeVector::from([0.415, 0.415, 0.155, 0.085, 0.060, 0.045, 0.042, 0.032])
 }
 
-/// How much adults differ from [`adult_shape`]: standard deviations, metres.
-pub fn adult_shape_deviation() -> ShapeVector {
-    ShapeVector::from([0.04, 0.04, 0.020, 0.015, 0.015, 0.020, 0.008, 0.006])
+/// What is known of legs before any is seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapePrior {
+    /// The most probable shape.
+    pub mean: ShapeVector,
+    /// Inverse of the covariance about it, 1/m².
+    pub information: SMatrix<f64, SHAPE, SHAPE>,
+}
+
+impl ShapePrior {
+    /// Walkers' users of every size: [`adult_shape`], larger or smaller as a whole, and each number somewhat by itself.
+    /// Thighs are as long as shanks (Winter: 0.245 and 0.246 of stature), and hips are often out of sight.
+    pub fn people() -> Self {
+        /// Size as a share of an adult's: from a child of 1.2 m to a man of 2.1 m and beyond.
+        const SIZE_SD: f64 = 0.17;
+        /// How a body of its size differs from others of that size, metres; girths include clothes.
+        const OWN_SD: [f64; SHAPE] = [0.025, 0.025, 0.018, 0.015, 0.015, 0.025, 0.008, 0.006];
+        const THIGH_LIKE_SHANK_SD: f64 = 0.015;
+        let mean = adult_shape();
+        let own = ShapeVector::from(OWN_SD.map(|sd| 1.0 / (sd * sd)));
+        // Inverse of diag(1/own) + size² mean meanᵀ (Sherman–Morrison).
+        let along = own.component_mul(&mean);
+        let share = 1.0 / (SIZE_SD * SIZE_SD) + mean.dot(&along);
+        let mut information = SMatrix::from_diagonal(&own) - along * along.transpose() / share;
+        let alike = 1.0 / (THIGH_LIKE_SHANK_SD * THIGH_LIKE_SHANK_SD);
+        for k in 0..2 {
+            information[(k, k)] += alike;
+            information[(k, 1 - k)] -= alike;
+        }
+        Self { mean, information }
+    }
+
+    /// The nearest shape that somebody may have, in clothes.
+    pub fn bounded(&self, shape: ShapeVector) -> ShapeVector {
+        const LENGTHS: [f64; 2] = [0.5, 1.35];
+        const RADII: [f64; 2] = [0.4, 3.0];
+        ShapeVector::from_fn(|k, _| {
+            let [least, most] = if k < 3 { LENGTHS } else { RADII };
+            shape[k].clamp(least * self.mean[k], most * self.mean[k])
+        })
+    }
+}
+
+/// How large legs are beside those of [`adult_shape`].
+pub fn size_of(shape: &ShapeVector) -> f64 {
+    let adult = adult_shape();
+    (shape[0] + shape[1]) / (adult[0] + adult[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn legs_that_are_smaller_as_a_whole_are_likelier_than_legs_with_one_bone_as_much_shorter() {
+        let prior = ShapePrior::people();
+        let surprise = |change: ShapeVector| (prior.information * change).dot(&change);
+        let smaller = surprise(prior.mean * -0.2);
+        let mut short = ShapeVector::zeros();
+        short[1] = -0.2 * prior.mean[1];
+        // A fifth of the size is little more than one standard deviation of 17 %.
+        assert!((1.0..2.0).contains(&smaller), "{smaller}");
+        assert!(surprise(short) > 8.0 * smaller, "{} {smaller}", surprise(short));
+        assert!(prior.information.cholesky().is_some());
+    }
+
+    #[test]
+    fn a_shape_within_bounds_stays_and_one_beyond_is_drawn_to_them() {
+        let prior = ShapePrior::people();
+        assert_eq!(prior.bounded(prior.mean * 0.6), prior.mean * 0.6);
+        let tiny = prior.bounded(prior.mean * 0.1);
+        assert_eq!((tiny[0], tiny[3]), (0.5 * prior.mean[0], 0.4 * prior.mean[3]));
+        assert!((size_of(&(prior.mean * 0.7)) - 0.7).abs() < 1e-12);
+    }
 }

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The floor comes from the background image, or from the first frames; nothing is set by hand. The legs' shape is
-//! estimated from the first seconds in which legs are seen ([`tracker::calibrate`]); then each frame is tracked
+//! estimated from the first seconds in which legs are seen ([`shape_fit::calibrate`]); then each frame is tracked
 //! ([`tracker`]) and smoothed ([`smoother`]). Images are read one by one, so memory does not grow with the recording but
 //! by the poses.
 //!
@@ -18,6 +18,7 @@ pub mod foreground;
 pub mod leg_model;
 pub mod paper;
 mod report;
+pub mod shape_fit;
 pub mod smoother;
 pub mod static_scene;
 pub mod steps;
@@ -36,14 +37,15 @@ use crate::recording::depth::{DepthImage, DepthReader, DepthUnit};
 use crate::recording::side_camera::{SideCamera, SideImages};
 use floor::Floor;
 use foreground::{Foreground, Preparation, Region};
-use leg_model::{LegPoint, LegSegment, POINTS, ShapeVector, adult_shape, adult_shape_deviation, point_of};
+use leg_model::{LegPoint, LegSegment, POINTS, ShapePrior, ShapeVector, point_of};
 use nalgebra::Vector3;
 use paper::PaperRun;
+use shape_fit::calibrate;
 use smoother::{SmoothedFrame, Smoother};
 use static_scene::StaticScene;
 use std::io::Read;
-use surface_fit::SEGMENTS;
-use tracker::{Tracker, calibrate, visibility};
+use surface_fit::{SEGMENTS, SLIVER_SHARE};
+use tracker::{Tracker, visibility};
 use two_legs::TwoLegs;
 
 /// Frames with two legs that the shape is estimated from.
@@ -56,6 +58,9 @@ const CALIBRATION_PATIENCE: usize = 450;
 const FLOOR_PATIENCE: usize = 30;
 /// A leg of which less than this share of shank and foot is seen is bridged.
 const SEEN_SHARE: f64 = 0.08;
+/// How far a leg may be from where it is guessed to be when it is hidden, along the axes of `floor`: standard deviations,
+/// metres; from simulated walks in which one leg hides the other.
+const HIDDEN_SD: Vector3<f64> = Vector3::new(0.04, 0.02, 0.03);
 
 /// Depth images one by one, with what is known of their camera.
 pub trait DepthFrames {
@@ -385,7 +390,7 @@ impl Run {
         let height = self.preparation.floor().camera_height;
         let used = self.waiting.iter().step_by(CALIBRATION_STRIDE);
         let used = used.map(|(time_ns, foreground)| (*time_ns, foreground.points.as_slice()));
-        let shape = calibrate(height, used, (&adult_shape(), &adult_shape_deviation()));
+        let shape = calibrate(height, used, &ShapePrior::people());
         self.tracker = Some((Tracker::new(height, shape), shape));
         for (time_ns, foreground) in std::mem::take(&mut self.waiting) {
             self.track(time_ns, &foreground);
@@ -405,9 +410,8 @@ impl Run {
     fn keep(&mut self, ready: Vec<SmoothedFrame>) {
         let Some((_, shape)) = &self.tracker else { return };
         let camera_height = self.preparation.floor().camera_height;
-        let focal = self.preparation.camera().fx;
         self.smoothed.extend(ready.into_iter().map(|frame| {
-            let legs = legs_of(&frame, shape, focal, camera_height);
+            let legs = legs_of(&frame, shape, camera_height);
             (frame.fit.time_ns, legs, frame.fit.restarted)
         }));
     }
@@ -481,15 +485,24 @@ fn seconds(time_ns: i64) -> f64 {
     time_ns as f64 * 1e-9
 }
 
-fn legs_of(frame: &SmoothedFrame, shape: &ShapeVector, focal: f64, camera_height: f64) -> Legs {
+fn legs_of(frame: &SmoothedFrame, shape: &ShapeVector, camera_height: f64) -> Legs {
     let place = |k: usize| (Side::BOTH[k / 4], LegPoint::ALL[k % 4]);
+    let visibility: [f32; SEGMENTS] = std::array::from_fn(|s| {
+        visibility(&frame.fit, shape, Side::BOTH[s / 3], LegSegment::ALL[s % 3], camera_height) as f32
+    });
+    // Of a leg behind the other one an edge is seen, if anything: whose edge that is, is a guess.
+    let hidden = Side::BOTH.map(|side| {
+        let shank = f64::from(visibility[3 * side as usize + LegSegment::Shank as usize]);
+        HIDDEN_SD * (1.0 - shank / SLIVER_SHARE).max(0.0)
+    });
     Legs {
         points: std::array::from_fn(|k| point_of(&frame.pose, place(k).0, place(k).1)),
-        deviations: std::array::from_fn(|k| point_of(&frame.deviation, place(k).0, place(k).1)),
-        velocities: std::array::from_fn(|k| point_of(&frame.velocity, place(k).0, place(k).1)),
-        visibility: std::array::from_fn(|s| {
-            visibility(&frame.fit, shape, Side::BOTH[s / 3], LegSegment::ALL[s % 3], focal, camera_height) as f32
+        deviations: std::array::from_fn(|k| {
+            let (side, point) = place(k);
+            point_of(&frame.deviation, side, point).zip_map(&hidden[side as usize], f64::hypot)
         }),
+        velocities: std::array::from_fn(|k| point_of(&frame.velocity, place(k).0, place(k).1)),
+        visibility,
         misfit: frame.fit.misfit,
         lost: frame.fit.lost,
     }

@@ -1,7 +1,7 @@
 //! From tracked legs to an assessment: series, steps, and how far they can be trusted.
 
 use super::floor_motion::FeetFrame;
-use super::leg_model::{LegPoint, adult_shape, adult_shape_deviation};
+use super::leg_model::LegPoint;
 use super::steps::gait;
 use super::{Legs, Track, TrackedFrame, seconds};
 use crate::assessment::quality::{Event, EventCount};
@@ -17,9 +17,9 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 const NORMAL_975: f64 = 1.96;
 /// What differs from body to body between a fitted point and the joint: standard deviation of hip, knee, ankle and toe,
 /// metres; from simulated walks.
-const BODY_SD: [f64; 4] = [0.04, 0.025, 0.012, 0.020];
+const BODY_SD: [f64; 4] = [0.04, 0.025, 0.015, 0.020];
 /// What of it does not cancel between the ankles, along x, y and z of `floor`, metres.
-const APART_BODY_SD: Vector3<f64> = Vector3::new(0.004, 0.008, 0.006);
+const APART_BODY_SD: Vector3<f64> = Vector3::new(0.006, 0.008, 0.008);
 /// Points on neither leg, as a share of the foreground, from which on something else is in sight.
 const FOREIGN_SHARE: f64 = 0.35;
 /// Share of pixels as in the background below which the background is of another place. A person behind a walker hides
@@ -29,8 +29,8 @@ const LEAST_UNCHANGED: f64 = 0.15;
 const LEAST_COVERAGE: f64 = 0.8;
 /// Share of pixels without depth above which the reader is told.
 const MOSTLY_MISSING: f64 = 0.6;
-/// A length this near to the limit of what is believed (in standard deviations) is implausible; the limit is 3.
-const IMPLAUSIBLE_SDS: f64 = 2.95;
+/// Thighs and shanks of people from 1.1 to 2.2 m (Winter: 0.245 of stature), metres.
+const PLAUSIBLE_LENGTH: std::ops::Range<f64> = 0.26..0.54;
 
 /// The assessment of a tracked recording.
 ///
@@ -217,10 +217,7 @@ fn warnings(track: &Track, gait: &Gait, coverage: f64) -> Vec<Warning> {
     let tracked: Vec<&Legs> = track.frames.iter().filter_map(|frame| frame.legs.as_ref()).collect();
     let misfit = tracked.iter().map(|legs| legs.misfit).sum::<f64>() / tracked.len().max(1) as f64;
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-    let implausible = track.shape.is_some_and(|shape| {
-        let (expected, deviation) = (adult_shape(), adult_shape_deviation());
-        (0..2).any(|k| (shape[k] - expected[k]).abs() > IMPLAUSIBLE_SDS * deviation[k])
-    });
+    let implausible = track.shape.is_some_and(|shape| (0..2).any(|k| !PLAUSIBLE_LENGTH.contains(&shape[k])));
     let n_blocked = track.frames.iter().filter(|frame| frame.blocked).count();
     let off_mount = off_mount(track);
     let found = [
@@ -256,7 +253,7 @@ fn warnings(track: &Track, gait: &Gait, coverage: f64) -> Vec<Warning> {
         (
             implausible,
             "implausible_lengths",
-            "the legs' lengths are at the limit of what adults have; check the camera's intrinsics".to_owned(),
+            "the legs' lengths are beyond what people have; check the camera's intrinsics".to_owned(),
         ),
         (
             off_mount.is_some(),

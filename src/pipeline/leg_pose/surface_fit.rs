@@ -8,8 +8,8 @@
 //!
 //! Derivatives with respect to a, b and both radii are −(1−t) n, −t n, −(1−t), −t with n = (p − c)/|p − c|.
 
-use super::foreground::ForegroundPoint;
-use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, SHAPE, ShapeVector, point_of};
+use super::foreground::{ForegroundPoint, REFERENCE_FOCAL};
+use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, SHAPE, ShapeVector, point_of, size_of};
 use crate::body::Side;
 use nalgebra::{SMatrix, SVector, Vector3};
 
@@ -27,6 +27,9 @@ const INDEPENDENT_POINTS: f64 = 30.0;
 /// its points count as much it drags the ankle along the shank by 1 to 2 cm (step length on simulated walks: 1.0 cm against
 /// 0.4 cm).
 const SEGMENT_TRUST: [f64; 3] = [10.0, 20.0, 1.0];
+/// Share of a segment of which less is a sliver beside something nearer: of it only an edge is seen, and edges are ragged
+/// and do not tell how far the leg goes on behind.
+pub const SLIVER_SHARE: f64 = 0.35;
 /// How exactly thigh, shank and foot have their lengths, metres: joint centres move in a bent joint, and a foot bends at
 /// the ball when its heel rises.
 const LENGTH_SD: [f64; 3] = [0.008, 0.003, 0.050];
@@ -38,8 +41,14 @@ const OPEN_ABOVE_HIP: f64 = 0.3;
 /// The middle of a shoe's rear lies this much below the ankle, metres; were a foot's axis to begin at the ankle, the low
 /// upper of the shoe would pull the ankle down.
 const FOOT_DROP: f64 = 0.05;
-/// Least height of the ankle's centre above the floor, metres: 0.039 of stature (Winter) and a shoe's sole.
-const ANKLE_HEIGHT: f64 = 0.09;
+/// Height of the ankle's centre above the floor of a standing adult, metres: 0.039 of stature (Winter) and a shoe's sole.
+const ANKLE_HEIGHT: f64 = 0.095;
+/// How much it differs from body to body, and while a foot rolls, metres.
+const ANKLE_SD: f64 = 0.015;
+/// An ankle is not lower than expected by more than this, metres.
+const ANKLE_LOWER: f64 = 0.02;
+/// An ankle that is higher than the other by this much is half as sure to stand, metres.
+const STANDING_APART: f64 = 0.02;
 /// Points higher than this below upright hips are trunk, arms and what hangs from them, metres.
 const BELOW_HIPS: f64 = 0.05;
 /// A foot is wider than high: half the width of its flat part at ankle and toes, metres.
@@ -81,12 +90,19 @@ struct Touch {
     residual: f64,
 }
 
+impl Cone {
+    fn covered_pixels(&self, camera: &Vector3<f64>) -> f64 {
+        covered_pixels(camera, [&self.start, &(self.start + self.axis)], self.radii[0] + self.radii[1])
+    }
+}
+
 fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
+    let size = size_of(shape);
     std::array::from_fn(|s| {
         let (side, segment) = side_and_segment(s);
         let mut start = point_of(pose, side, segment.start());
         if segment == LegSegment::Foot {
-            start.y -= FOOT_DROP;
+            start.y -= FOOT_DROP * size;
         }
         let axis = point_of(pose, side, segment.end()) - start;
         let (_, [first, last]) = segment.shape_indices();
@@ -102,6 +118,11 @@ fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
         };
         Cone { start, axis, inverse_squared_length, range, radii: [shape[first], shape[last]], across }
     })
+}
+
+/// Height of a standing ankle of a body of this size: soles do not grow with the body.
+fn ankle_height(size: f64) -> f64 {
+    ANKLE_HEIGHT * (0.5 + 0.5 * size)
 }
 
 /// Side and segment of a place among the six segments.
@@ -145,7 +166,7 @@ pub fn linearise(
     let mut weights = [0.0; SEGMENTS];
     let mut support = [0.0; SEGMENTS];
     let (mut explained, mut misfit, mut total) = (0.0, 0.0, 0.0);
-    let top = ANKLE_HEIGHT + shape[0] + shape[1] - BELOW_HIPS;
+    let top = ankle_height(size_of(shape)) + shape[0] + shape[1] - BELOW_HIPS;
     for point in points.iter().filter(|point| point.position.y < top) {
         total += point.pixels;
         let Some(touch) = touch(&cones, &point.position) else {
@@ -186,7 +207,10 @@ pub fn linearise(
         misfit: misfit / f64::max(total, 1.0),
     };
     for (s, (block, vector)) in blocks.iter().zip(&vectors).enumerate() {
-        let scale = segment_scale(weights[s]) * SEGMENT_TRUST[s % 3];
+        // A thigh is cut off by the image's upper edge, which tells nothing of the part that is seen.
+        let seen =
+            if s % 3 == 0 { 1.0 } else { (weights[s] / (SLIVER_SHARE * cones[s].covered_pixels(camera))).min(1.0) };
+        let scale = segment_scale(weights[s]) * SEGMENT_TRUST[s % 3] * seen;
         let places = places_of_segment(s);
         for r in 0..8 {
             system.gradient[places[r]] += scale * vector[r];
@@ -203,6 +227,14 @@ fn segment_scale(weight: f64) -> f64 {
     // A dense point stands for nine pixels: as many pixels err together.
     let independent = (weight / 30.0).min(INDEPENDENT_POINTS);
     independent / weight.max(1e-9) / (SURFACE_SD * SURFACE_SD)
+}
+
+/// Pixels of a Kinect v1 that a segment between two points would cover; `width` is the sum of its radii, metres.
+pub fn covered_pixels(camera: &Vector3<f64>, ends: [&Vector3<f64>; 2], width: f64) -> f64 {
+    let view = 0.5 * (ends[0] + ends[1]) - camera;
+    let distance = view.norm().max(0.1);
+    let across = (ends[1] - ends[0]).cross(&view).norm() / distance;
+    ((across * width + 0.5 * width * width) * (REFERENCE_FOCAL / distance).powi(2)).max(1.0)
 }
 
 /// Places among the unknowns of a segment's start, end and two radii.
@@ -234,7 +266,7 @@ impl NormalEquations {
             self.add_knee(side, pose);
             self.add_foot(side, pose, shape);
         }
-        self.add_pelvis(pose);
+        self.add_pelvis(pose, shape);
         self.add_clearance(pose, shape);
     }
 
@@ -285,24 +317,45 @@ impl NormalEquations {
         if sole < 0.0 {
             self.add(sole, FLOOR_SD, &[(toe + 1, 1.0), (POSE + 7, -1.0)]);
         }
-        let lowest = pose[ankle + 1] - ANKLE_HEIGHT;
+        let lowest = pose[ankle + 1] - ankle_height(size_of(shape)) + ANKLE_LOWER;
         if lowest < 0.0 {
             self.add(lowest, FLOOR_SD, &[(ankle + 1, 1.0)]);
         }
+        // One foot stands; the other one does so the more the less it is higher.
+        let other = 3 * LegPoint::Ankle.index(side.opposite());
+        let higher = (pose[ankle + 1] - pose[other + 1]).max(0.0);
+        let share = 1.0 / (1.0 + (higher / STANDING_APART).powi(2));
+        self.add(pose[ankle + 1] - ankle_height(size_of(shape)), ANKLE_SD / share, &[(ankle + 1, 1.0)]);
     }
 
-    /// Hips are about level and a pelvis apart, and the user looks at the camera.
-    fn add_pelvis(&mut self, pose: &PoseVector) {
+    /// Hips are about level and a pelvis apart, above the feet and as high as legs that walk, and the user looks at the
+    /// camera.
+    ///
+    /// Of a straight leg in wide trousers neither knee nor hip is seen, and a leg slides along itself by centimetres.
+    fn add_pelvis(&mut self, pose: &PoseVector, shape: &ShapeVector) {
         const WIDTH: f64 = 0.17;
         const WIDTH_SD: f64 = 0.02;
         const LEVEL_SD: f64 = 0.06;
         const ROTATION_SD: f64 = 0.10;
+        /// How far hips are before or behind the middle of the feet, metres.
+        const AHEAD_SD: f64 = 0.08;
+        /// Height of hips above ankles as a share of a leg's length in walking, and how much it differs, metres.
+        const STRETCH: f64 = 0.955;
+        const HEIGHT_SD: f64 = 0.025;
         let [left, right] = Side::BOTH.map(|side| 3 * LegPoint::Hip.index(side));
-        let sds = [(WIDTH, WIDTH_SD), (0.0, LEVEL_SD), (0.0, ROTATION_SD)];
+        let sds = [(WIDTH * size_of(shape), WIDTH_SD), (0.0, LEVEL_SD), (0.0, ROTATION_SD)];
         for (axis, (expected, sd)) in sds.into_iter().enumerate() {
             let residual = pose[left + axis] - pose[right + axis] - expected;
             self.add(residual, sd, &[(left + axis, 1.0), (right + axis, -1.0)]);
         }
+        let [left_ankle, right_ankle] = Side::BOTH.map(|side| 3 * LegPoint::Ankle.index(side));
+        let ahead = 0.5 * (pose[left + 2] + pose[right + 2] - pose[left_ankle + 2] - pose[right_ankle + 2]);
+        let middle = [(left + 2, 0.5), (right + 2, 0.5), (left_ankle + 2, -0.5), (right_ankle + 2, -0.5)];
+        self.add(ahead, AHEAD_SD, &middle);
+        let upright = ankle_height(size_of(shape)) + STRETCH * (shape[0] + shape[1]);
+        let height = 0.5 * (pose[left + 1] + pose[right + 1]);
+        let derivatives = [(left + 1, 0.5), (right + 1, 0.5), (POSE, -STRETCH), (POSE + 1, -STRETCH)];
+        self.add(height - upright, HEIGHT_SD, &derivatives);
     }
 
     /// Knees and ankles do not go through each other.

@@ -6,8 +6,8 @@
 //! kept.
 
 use super::foreground::ForegroundPoint;
-use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, SHAPE, ShapeVector, point_of, set_point};
-use super::surface_fit::{NormalEquations, SEGMENTS, linearise};
+use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, ShapeVector, point_of, set_point};
+use super::surface_fit::{NormalEquations, SEGMENTS, covered_pixels, linearise};
 use super::two_legs::TwoLegs;
 use crate::body::Side;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -29,11 +29,11 @@ const START_SD: f64 = 0.10;
 /// Standard deviation of a velocity of which nothing is known, m/s.
 const START_SPEED_SD: f64 = 1.0;
 /// A frame that leaves this share of its points unexplained is compared with a fresh start.
-const DOUBTFUL_MISFIT: f64 = 0.20;
+pub(super) const DOUBTFUL_MISFIT: f64 = 0.20;
 /// A fresh start is taken when it is better by this much.
 const BETTER: f64 = 0.03;
 /// A start that leaves more unexplained is no pair of legs.
-const HOPELESS_MISFIT: f64 = 0.55;
+pub(super) const HOPELESS_MISFIT: f64 = 0.55;
 /// Pixels that a leg's shank and foot must have for the leg to count as seen.
 const MIN_LEG_PIXELS: f64 = 250.0;
 /// A leg unseen for longer is lost, seconds.
@@ -303,80 +303,12 @@ fn upright_leg(points: &[ForegroundPoint], camera: &Vector3<f64>, shape: &ShapeV
     [at(knee + shape[0], -0.05), at(knee, 0.0), at(ANKLE_HEIGHT, -0.02), at(TOE_HEIGHT, shape[2] - 0.02)]
 }
 
-/// The shape that fits a stretch of frames best, from a start and what is known of adults.
-///
-/// Each frame is fitted with the shape held; its normal equations, freed of the pose (Schur complement), then say how the
-/// shape should change. Frames of one body err alike: together they count as `INDEPENDENT_FRAMES`.
-pub fn calibrate<'a>(
-    camera_height: f64,
-    frames: impl Iterator<Item = (i64, &'a [ForegroundPoint])> + Clone,
-    prior: (&ShapeVector, &ShapeVector),
-) -> ShapeVector {
-    const ROUNDS: usize = 5;
-    const FREE_ROUNDS: usize = 3;
-    /// Thighs are as long as shanks (Winter: 0.245 and 0.246 of stature), and hips are often out of sight.
-    const THIGH_LIKE_SHANK_SD: f64 = 0.015;
-    const INDEPENDENT_FRAMES: f64 = 12.0;
-    let (expected, deviation) = prior;
-    let mut shape = *expected;
-    for round in 0..ROUNDS {
-        let mut tracker = Tracker::new(camera_height, shape);
-        let mut matrix = SMatrix::<f64, SHAPE, SHAPE>::zeros();
-        let mut gradient = ShapeVector::zeros();
-        let mut count = 0.0;
-        for (time_ns, points) in frames.clone() {
-            let Some((fit, system)) = tracker.advance_with(time_ns, points) else { continue };
-            // The first rounds are made with a shape that may be far off.
-            if fit.misfit > if round < FREE_ROUNDS { HOPELESS_MISFIT } else { DOUBTFUL_MISFIT } {
-                continue;
-            }
-            let cross = system.matrix.fixed_view::<SHAPE, POSE>(POSE, 0);
-            let Some(factor) = (fit.information + PoseMatrix::identity() * 1.0).cholesky() else { continue };
-            let freed = cross * factor.inverse();
-            matrix += system.matrix.fixed_view::<SHAPE, SHAPE>(POSE, POSE) - freed * cross.transpose();
-            gradient += system.gradient.fixed_rows::<SHAPE>(POSE) - freed * system.gradient.fixed_rows::<POSE>(0);
-            count += 1.0;
-        }
-        let scale = INDEPENDENT_FRAMES / f64::max(count, INDEPENDENT_FRAMES);
-        matrix *= scale;
-        gradient *= scale;
-        for k in 0..SHAPE {
-            let information = 1.0 / (deviation[k] * deviation[k]);
-            matrix[(k, k)] += information;
-            gradient[k] += information * (shape[k] - expected[k]);
-        }
-        let information = 1.0 / (THIGH_LIKE_SHANK_SD * THIGH_LIKE_SHANK_SD);
-        for (r, sign) in [(0, 1.0), (1, -1.0)] {
-            gradient[r] += sign * information * (shape[0] - shape[1]);
-            matrix[(r, r)] += information;
-            matrix[(r, 1 - r)] -= information;
-        }
-        let Some(factor) = matrix.cholesky() else { break };
-        shape -= factor.solve(&gradient);
-        for k in 0..SHAPE {
-            shape[k] = shape[k].clamp(expected[k] - 3.0 * deviation[k], expected[k] + 3.0 * deviation[k]);
-        }
-    }
-    shape
-}
-
 /// How much of a segment that faces the camera was seen, 0 to 1: the pixels it explains of those it would cover.
-pub fn visibility(
-    fit: &FrameFit,
-    shape: &ShapeVector,
-    side: Side,
-    segment: LegSegment,
-    focal_length: f64,
-    camera_height: f64,
-) -> f64 {
+pub fn visibility(fit: &FrameFit, shape: &ShapeVector, side: Side, segment: LegSegment, camera_height: f64) -> f64 {
     let pose = fit.belief.pose();
     let start = point_of(&pose, side, segment.start());
     let end = point_of(&pose, side, segment.end());
     let (_, [first, last]) = segment.shape_indices();
-    let view = 0.5 * (start + end) - Vector3::new(0.0, camera_height, 0.0);
-    let distance = view.norm().max(0.1);
-    let across = (end - start).cross(&view).norm() / distance;
-    let width = shape[first] + shape[last];
-    let covered = (across * width + 0.5 * width * width) * (focal_length / distance).powi(2);
-    (fit.support[3 * side as usize + segment as usize] / covered.max(1.0)).min(1.0)
+    let covered = covered_pixels(&Vector3::new(0.0, camera_height, 0.0), [&start, &end], shape[first] + shape[last]);
+    (fit.support[3 * side as usize + segment as usize] / covered).min(1.0)
 }

@@ -26,11 +26,13 @@ const MIN_COVERAGE: f64 = 0.8;
 const TURN: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// Way of a standing foot, metres, on which a bend is half believed: a bend of 2 mm on 0.1 m is 9 degrees.
 const NOTHING_SURE: f64 = 0.1;
+/// Standard deviation of a well-seen standing foot about its path, metres.
+const PATH_SD: f64 = 0.004;
 /// 97.5 % point of the normal distribution.
 const NORMAL_975: f64 = 1.96;
 /// What differs from body to body between tracked ankles and joints, and does not cancel between the feet: standard
 /// deviation along and across by the definitions of a step, metres; from simulated walks.
-const ANKLE_BODY_SD: [f64; 2] = [0.007, 0.004];
+const ANKLE_BODY_SD: [f64; 2] = [0.009, 0.006];
 /// See [`ANKLE_BODY_SD`].
 const PRINT_BODY_SD: [f64; 2] = [0.012, 0.007];
 
@@ -85,27 +87,46 @@ fn swings(frames: &[FeetFrame], phases: &[Phase]) -> Vec<Swing> {
         }
         let Phase::Swing { side, backward } = phases[begin] else { continue };
         let run = begin..k;
-        // A swing at either end of the recording is cut off: its contact was not seen.
-        if begin == 0 || k == phases.len() {
+        // Of a swing at the beginning nobody knows when it began; at the end its contact is known when the foot has
+        // come to rest.
+        if begin == 0 {
             continue;
         }
+        let heel_strike = if k < phases.len() { Some(k) } else { rest(frames, side, run.clone()) };
+        let Some(heel_strike) = heel_strike else { continue };
         let relative = |n: usize| frames[n].ankle[side as usize] - frames[n].ankle[side.opposite() as usize];
-        let way = (relative(k) - relative(begin)).y.abs();
-        let time = frames[k].time - frames[begin].time;
-        let seen = frames[begin..k].iter().filter(|f| f.seen).count();
-        if way >= MIN_SWING && SWING_TIME.contains(&time) && 2 * seen >= k - begin {
-            swings.push(Swing { side, backward, toe_off: toe_off(frames, side, run), heel_strike: k });
+        let way = (relative(heel_strike) - relative(begin)).y.abs();
+        let time = frames[heel_strike].time - frames[begin].time;
+        let seen = frames[begin..heel_strike].iter().filter(|f| f.seen).count();
+        if way >= MIN_SWING && SWING_TIME.contains(&time) && 2 * seen >= heel_strike - begin {
+            swings.push(Swing { side, backward, toe_off: toe_off(frames, side, run), heel_strike });
         }
     }
     swings
 }
 
+/// The frame in which a foot that swings until the last frame has come to rest against the other one.
+fn rest(frames: &[FeetFrame], side: Side, swing: std::ops::Range<usize>) -> Option<usize> {
+    /// Frames that it must rest for, so that it is not the slow beginning of another swing.
+    const RESTING: usize = 2;
+    let (speed, fastest) = speeds(frames, side, &swing);
+    let last = swing.clone().rfind(|k| speed(*k) >= TOE_OFF_SPEED * fastest)?;
+    (last + RESTING < swing.end).then_some(last + 1)
+}
+
 /// The frame in which the toes leave the floor: the ankle moves before, while the heel rises over the standing toes, but
 /// not as fast as in the air.
 fn toe_off(frames: &[FeetFrame], side: Side, swing: std::ops::Range<usize>) -> usize {
-    let speed = |k: usize| (frames[k].velocity[side as usize].y - frames[k].velocity[side.opposite() as usize].y).abs();
-    let fastest = swing.clone().map(speed).fold(0.0, f64::max);
+    let (speed, fastest) = speeds(frames, side, &swing);
     swing.clone().find(|k| speed(*k) >= TOE_OFF_SPEED * fastest).unwrap_or(swing.start)
+}
+
+/// Speed of a swinging foot against the other one, m/s, and its greatest in the swing.
+fn speeds(frames: &[FeetFrame], side: Side, swing: &std::ops::Range<usize>) -> (impl Fn(usize) -> f64, f64) {
+    let speed = move |k: usize| {
+        (frames[k].velocity[side as usize].y - frames[k].velocity[side.opposite() as usize].y).abs()
+    };
+    (speed, swing.clone().map(speed).fold(0.0, f64::max))
 }
 
 /// Swings that follow each other without a rest, in one direction.
@@ -232,8 +253,10 @@ fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
         .iter()
         .map(|swing| {
             let standing = swing.side.opposite() as usize;
-            let path: Vec<Vector2<f64>> =
-                frames[swing.toe_off..=swing.heel_strike].iter().map(|frame| frame.ankle[standing]).collect();
+            let path: Vec<(Vector2<f64>, f64)> = frames[swing.toe_off..=swing.heel_strike]
+                .iter()
+                .map(|frame| (frame.ankle[standing], 1.0 / (frame.ankle_sd[standing].x.powi(2) + PATH_SD * PATH_SD)))
+                .collect();
             bend(&path)
         })
         .collect();
@@ -248,7 +271,10 @@ fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
             let around = n.saturating_sub(1)..(n + 2).min(walk.len());
             let (sum, weight) = around.fold((0.0, 0.0), |(sum, total), k| {
                 let (angle, way) = bends[k];
-                (sum + angle * step_share(k) * way * way, total + way * way)
+                // Its own twice, so that both feet count alike: as one leg passes behind the other its path bends to its
+                // own side, and a turn bends both to one side.
+                let weight = way * way * if k == n { 2.0 } else { 1.0 };
+                (sum + angle * step_share(k) * weight, total + weight)
             });
             // A step of a few centimetres bends by chance.
             if weight > 0.0 { sum / weight * (weight / (weight + NOTHING_SURE * NOTHING_SURE)) } else { 0.0 }
@@ -256,22 +282,23 @@ fn turns(frames: &[FeetFrame], walk: &[Swing]) -> Vec<f64> {
         .collect()
 }
 
-/// Change of direction along a path and its extent along z: the parabola x(z) of least squares.
-fn bend(path: &[Vector2<f64>]) -> (f64, f64) {
-    let n = path.len() as f64;
-    let mean = path.iter().sum::<Vector2<f64>>() / n;
-    let (first, last) = (path[0].y, path[path.len() - 1].y);
-    let way = (last - first).abs();
+/// Change of direction along a path of weighted places and its extent along z as far as it is sure: the parabola x(z) of
+/// least squares.
+fn bend(path: &[(Vector2<f64>, f64)]) -> (f64, f64) {
+    let total: f64 = path.iter().map(|(_, weight)| weight).sum();
+    let mean = path.iter().map(|(place, weight)| place * *weight).sum::<Vector2<f64>>() / total;
+    let way = path[path.len() - 1].0.y - path[0].0.y;
     let mut matrix = Matrix3::zeros();
     let mut vector = Vector3::zeros();
-    for place in path {
+    for (place, weight) in path {
         let z = place.y - mean.y;
         let row = Vector3::new(1.0, z, z * z);
-        matrix += row * row.transpose();
-        vector += row * (place.x - mean.x);
+        matrix += row * row.transpose() * *weight;
+        vector += row * (place.x - mean.x) * *weight;
     }
+    let sure = total * PATH_SD * PATH_SD / path.len() as f64;
     match matrix.lu().solve(&vector) {
-        Some(parabola) if way > 0.0 => (2.0 * parabola[2] * (last - first), way),
+        Some(parabola) if way != 0.0 => (2.0 * parabola[2] * way, way.abs() * sure.sqrt()),
         _ => (0.0, 0.0),
     }
 }

@@ -133,3 +133,27 @@ fn a_foot_that_steps_twice_running_gives_no_measures() {
         assert!(pair.iter().all(|step| step.measures.is_empty() && !step.excluded_because.is_empty()));
     }
 }
+
+#[test]
+fn a_recording_that_ends_soon_after_a_contact_has_that_step_and_one_that_ends_in_the_air_has_not() {
+    let frames = seen_walk(5, STEP_M);
+    let contact = ((REST_S + 5.0 * STEP_S) * RATE_HZ) as usize;
+    assert_eq!(gait(&frames[..contact + 6]).steps.len(), 5);
+    let in_the_air = contact - (0.4 * STEP_S * RATE_HZ) as usize;
+    assert_eq!(gait(&frames[..in_the_air]).steps.len(), 4);
+}
+
+#[test]
+fn paths_that_bend_each_to_its_own_side_are_no_turn_and_paths_that_bend_to_one_side_are() {
+    let bent = |curvature: [f64; 2]| {
+        let mut frames = seen_walk(9, STEP_M);
+        for frame in &mut frames {
+            for (foot, curvature) in curvature.into_iter().enumerate() {
+                frame.ankle[foot].x += curvature * (frame.ankle[foot].y + 1.0).powi(2);
+            }
+        }
+        reasons(&gait(&frames)).iter().filter(|(reason, _)| *reason == "turning").map(|(_, n)| *n).sum::<u64>()
+    };
+    assert_eq!(bent([0.2, -0.2]), 0);
+    assert!(bent([0.2, 0.2]) >= 5, "{}", bent([0.2, 0.2]));
+}
