@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 
 /// A patient of the rules' population with three walks and three rises.
 async fn followed(app: &TestApp) -> String {
-    let new = json!({"pseudonym": "P-7", "birth_year": 1948, "sex": "male", "uses_walking_aid": false, "height_m": 1.74});
+    let new =
+        json!({"pseudonym": "P-7", "birth_year": 1948, "sex": "male", "uses_walking_aid": false, "height_m": 1.74});
     let patient = text(&app.post("/v1/patients").json(&new).send().await.expect(StatusCode::CREATED)["id"]).to_owned();
     let answers = json!({"falls_12_months": 0, "lives_in_community": true, "worries_about_falling": false});
     app.post(&format!("/v1/patients/{patient}/questionnaires")).json(&answers).send().await.expect(StatusCode::CREATED);
@@ -29,7 +30,10 @@ async fn a_report_holds_findings_measures_trends_and_what_is_missing() {
     let app = TestApp::new().await;
     let patient = followed(&app).await;
     let report = app.get(&format!("/v1/patients/{patient}/report")).send().await.expect(StatusCode::OK);
-    assert_eq!((&report["patient"]["pseudonym"], &report["patient"]["matches_population"]), (&json!("P-7"), &json!(true)));
+    assert_eq!(
+        (&report["patient"]["pseudonym"], &report["patient"]["matches_population"]),
+        (&json!("P-7"), &json!(true))
+    );
     let rules = app.get("/v1/fall-risk-rules").send().await.expect(StatusCode::OK);
     let findings = report["findings"].as_array().unwrap();
     assert_eq!(findings.len(), rules["items"].as_array().unwrap().len());
@@ -124,7 +128,8 @@ async fn a_report_is_read_as_fhir_resources_one_by_one_by_search_and_as_a_bundle
     let next = found["link"].as_array().unwrap().iter().find(|link| link["relation"] == "next").unwrap();
     let rest = app.get(text(&next["url"])).send().await.expect(StatusCode::OK);
     assert_eq!(rest["entry"].as_array().unwrap().len(), 1);
-    let early = search(&format!("Observation?patient=Patient/{patient}&date=lt2026-03-02")).await.expect(StatusCode::OK);
+    let early =
+        search(&format!("Observation?patient=Patient/{patient}&date=lt2026-03-02")).await.expect(StatusCode::OK);
     assert_eq!(early["entry"].as_array().unwrap().len(), 2);
     let foreign = search(&format!("Observation?patient={patient}&code=http://loinc.org|1-8")).await;
     assert_eq!(foreign.expect(StatusCode::OK).get("entry"), None);
