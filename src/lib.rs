@@ -28,6 +28,7 @@
 //! | [`queue`] | durable jobs |
 //! | [`worker`] | claim, load, assess, save |
 //! | [`api`] | HTTP, one file per resource |
+//! | [`pages`] | the clinician's pages: HTML, one file per page |
 //! | [`cli`] | the commands |
 //!
 //! # One recording's journey
@@ -53,6 +54,7 @@ pub mod evaluation;
 pub mod fall_risk;
 pub mod gait;
 pub mod geometry;
+pub mod pages;
 pub mod pipeline;
 pub mod progress;
 pub mod protocol;
