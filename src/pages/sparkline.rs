@@ -76,7 +76,7 @@ mod tests {
             side: None,
             unit: "m/s".into(),
             points: values.iter().map(point).collect(),
-            n_other_definitions: 0,
+            definition: None,
             since_previous: None,
             since_first: None,
         }

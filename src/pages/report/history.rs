@@ -16,7 +16,8 @@ pub(super) struct TrendView {
     pub svg: String,
     pub course: String,
     pub changes: Vec<ChangeView>,
-    pub left_out: String,
+    /// The definition that the values follow, where there are several; empty where there is one.
+    pub definition: String,
 }
 
 /// A difference and what it means.
@@ -49,16 +50,13 @@ impl TrendView {
         };
         let changes =
             [change("the value before", &trend.since_previous), change("the first value shown", &trend.since_first)];
-        let left_out = match trend.n_other_definitions {
-            0 => String::new(),
-            n => format!("{} of another definition left out: not comparable", words::count(n)),
-        };
+        let definition = trend.definition.as_ref().map_or_else(String::new, |id| format!("definition {id}"));
         Self {
             title: with_side(&trend.title, trend.side),
             svg: sparkline(trend),
             course,
             changes: changes.into_iter().flatten().collect(),
-            left_out,
+            definition,
         }
     }
 }
