@@ -119,7 +119,8 @@ fn onset(motion: &Motion, way: &Transition, seated_from: usize) -> usize {
     let fastest = around.clone().map(|i| speed[i]).filter(|v| v.is_finite()).fold(0.0, f64::max);
     // Back from the last node at which the trunk still leans at speed.
     let Some(last) = around.clone().rev().find(|&i| speed[i] > LEAN_EDGE * fastest) else { return way.start };
-    let start = (first..last).rev().find(|&i| !(speed[i] > LEAN_EDGE * fastest)).map_or(first, |i| i + 1);
+    let start =
+        (first..last).rev().find(|&i| speed[i].is_nan() || speed[i] <= LEAN_EDGE * fastest).map_or(first, |i| i + 1);
     let leans = motion.trunk_flexion[last] - motion.trunk_flexion[start] >= LEAN_DEG;
     if leans && (way.start - last) as f64 * INTERVAL_S < 0.5 { start } else { way.start }
 }

@@ -18,8 +18,6 @@ pub mod places;
 mod recognition;
 pub mod repetitions;
 pub mod stance;
-#[cfg(test)]
-mod tests;
 pub mod transition;
 pub mod walking;
 

@@ -93,10 +93,12 @@ pub fn all(motion: &Motion) -> Vec<Hold> {
             if !is_still {
                 break;
             }
-            let share = INTERVAL_S;
-            for side in 0..2 {
-                anchor[side] += share * (feet[side][i] - anchor[side]);
-                knee[side] += share * (motion.knee[side][i] - knee[side]);
+            // A mean that forgets within a second.
+            for (anchor, foot) in anchor.iter_mut().zip(&feet) {
+                *anchor += INTERVAL_S * (foot[i] - *anchor);
+            }
+            for (knee, flexion) in knee.iter_mut().zip(&motion.knee) {
+                *knee += INTERVAL_S * (flexion[i] - *knee);
             }
             end = i;
         }

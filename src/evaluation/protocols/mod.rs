@@ -6,6 +6,8 @@
 mod chain;
 mod reference;
 #[cfg(test)]
+mod simulated_tests;
+#[cfg(test)]
 mod tests;
 
 pub use chain::{Chain, chains};

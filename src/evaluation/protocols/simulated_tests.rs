@@ -1,9 +1,9 @@
 //! The catalogue on simulated exercises, whose truth is known, and on recordings that are none of it.
 
-use super::*;
 use crate::assessment::{Assessment, Performance, PerformanceStatus, Series, Settings};
 use crate::pipeline::assess;
 use crate::progress::Monitor;
+use crate::protocol::{PROTOCOLS, ProtocolKind, ProtocolSensor, find, perform, protocols, recognize};
 use crate::recording::Recording;
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 use std::collections::HashSet;
