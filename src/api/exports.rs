@@ -7,15 +7,17 @@ use super::request::{ApiPath, ApiQuery};
 use super::state::AppState;
 use crate::assessment::JointTrack;
 use crate::body::Joint;
-use crate::report::export::{Form, NotExportable, Samples, bvh, csv, mot, trc};
-use crate::storage::{SeriesQuery, StoredAssessment};
+use crate::report::export::{NotExportable, Samples, bvh, csv, mot, trc};
+use crate::storage::SeriesQuery;
 use axum::Json;
+use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
+use futures::stream;
 use garde::Validate;
 use serde::{Deserialize, Serialize};
-use tokio::task::spawn_blocking;
+use std::convert::Infallible;
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -105,30 +107,33 @@ async fn export_assessment(
     ApiQuery(query): ApiQuery<ExportQuery>,
 ) -> Result<Response, ApiError> {
     let assessment = state.store.assessment(&caller.access, path.id).await?;
-    let (form, extension, media) = match query.form {
-        ExportForm::Csv => (Form::Csv, "csv", "text/csv; charset=utf-8"),
-        ExportForm::Mot => (Form::Mot, "mot", "text/plain; charset=utf-8"),
-        ExportForm::Trc => (Form::Trc, "trc", "text/plain; charset=utf-8"),
-        ExportForm::Bvh => (Form::Bvh, "bvh", "text/plain; charset=utf-8"),
+    let (extension, media) = match query.form {
+        ExportForm::Csv => ("csv", "text/csv; charset=utf-8"),
+        ExportForm::Mot => ("mot", "text/plain; charset=utf-8"),
+        ExportForm::Trc => ("trc", "text/plain; charset=utf-8"),
+        ExportForm::Bvh => ("bvh", "text/plain; charset=utf-8"),
     };
-    let text = match form {
-        Form::Trc => {
+    let export = match query.form {
+        ExportForm::Trc => {
             let track = state.store.joints_of_assessment(&caller.access, path.id).await?;
-            let track = track.ok_or_else(|| not_exportable(&NO_SKELETON))?;
-            in_background(move || Ok(trc(&track))).await?
+            trc(track.ok_or_else(|| not_exportable(&NO_SKELETON))?)
         }
-        Form::Csv | Form::Mot | Form::Bvh => {
+        form => {
             let slice = state.store.series_of_assessment(&caller.access, path.id, &SeriesQuery::default()).await?;
-            in_background(move || {
-                text_of(form, &assessment, &Samples { time_ns: &slice.time_ns, series: &slice.series })
-            })
-            .await?
+            let samples = Samples { time_ns: slice.time_ns, series: slice.series };
+            let made = match form {
+                ExportForm::Mot => mot(samples),
+                ExportForm::Bvh => bvh(samples, assessment.quality.calibration.as_ref()),
+                ExportForm::Csv | ExportForm::Trc => Ok(csv(samples)),
+            };
+            made.map_err(|reason| not_exportable(&reason))?
         }
     };
     let name = format!("attachment; filename=\"{}.{extension}\"", path.id);
     let name = HeaderValue::from_str(&name).map_err(ApiError::internal)?;
     let headers = [(header::CONTENT_TYPE, HeaderValue::from_static(media)), (header::CONTENT_DISPOSITION, name)];
-    Ok((headers, text).into_response())
+    let body = Body::from_stream(stream::iter(export.pieces().map(Ok::<_, Infallible>)));
+    Ok((headers, body).into_response())
 }
 
 /// Read where joints were
@@ -151,21 +156,6 @@ async fn read_joints(
 
 const NO_SKELETON: NotExportable =
     NotExportable("this assessment holds no joint places: its recording has no skeleton");
-
-fn text_of(form: Form, assessment: &StoredAssessment, samples: &Samples<'_>) -> Result<String, NotExportable> {
-    match form {
-        Form::Mot => mot(samples),
-        Form::Bvh => bvh(samples, assessment.quality.calibration.as_ref()),
-        Form::Csv | Form::Trc => Ok(csv(samples)),
-    }
-}
-
-async fn in_background(
-    work: impl FnOnce() -> Result<String, NotExportable> + Send + 'static,
-) -> Result<String, ApiError> {
-    let done = spawn_blocking(work).await.map_err(ApiError::internal)?;
-    done.map_err(|reason| not_exportable(&reason))
-}
 
 fn not_exportable(reason: &NotExportable) -> ApiError {
     ApiError::field("form", format!("is not possible: {reason}"))

@@ -4,7 +4,8 @@ use super::auth::Caller;
 use super::error::ApiError;
 use super::request::ApiPath;
 use super::state::AppState;
-use crate::protocol::{self, ProtocolInfo};
+use crate::fall_risk::rules_of_measure;
+use crate::protocol::{self, PROTOCOLS, ProtocolInfo};
 use axum::Json;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -39,7 +40,8 @@ pub struct ProtocolPath {
 #[utoipa::path(get, path = "/v1/protocols", tag = "protocols", operation_id = "list_protocols",
     responses((status = 200, description = "The catalogue", body = ProtocolsResponse)))]
 async fn list_protocols(_: Caller) -> Json<ProtocolsResponse> {
-    Json(ProtocolsResponse { items: protocol::protocols() })
+    let items = PROTOCOLS.iter().map(|protocol| protocol.info(rules_of_measure)).collect();
+    Json(ProtocolsResponse { items })
 }
 
 /// Read a protocol
@@ -48,5 +50,5 @@ async fn list_protocols(_: Caller) -> Json<ProtocolsResponse> {
     responses((status = 200, description = "The protocol", body = ProtocolInfo)))]
 async fn read_protocol(_: Caller, ApiPath(path): ApiPath<ProtocolPath>) -> Result<Json<ProtocolInfo>, ApiError> {
     let found = protocol::find(&path.id).ok_or(ApiError::NotFound("protocol"))?;
-    Ok(Json(found.info()))
+    Ok(Json(found.info(rules_of_measure)))
 }

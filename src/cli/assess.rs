@@ -11,13 +11,15 @@ use crate::assessment::{
 use crate::estimation::orientation_filter::OrientationMethod;
 use crate::pipeline::{self, Inputs};
 use crate::progress::{Monitor, Step};
+use crate::protocol;
 use crate::recording::decode::{Limits, decode};
 use crate::recording::{Format, Recording};
+use crate::report::export::{Samples, csv};
 use anyhow::{Context, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
 use std::fs;
-use std::io::{IsTerminal, Write};
+use std::io::{BufWriter, IsTerminal, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -80,7 +82,7 @@ pub struct Args {
     /// Draw these frames only, from A to before B, and each of them also as a picture of its own
     #[arg(long, value_name = "A..B", requires = "overlay")]
     frames_range: Option<FrameRange>,
-    /// Print summary, quality and provenance as JSON
+    /// Print summary, steps, performance, quality and provenance as JSON
     #[arg(long)]
     json: bool,
 }
@@ -115,6 +117,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Inputs { noise_model: args.noise_model.as_ref().and_then(NoiseModelChoice::model), ..Inputs::default() };
     let mut assessment = assess_with_progress(&recording, &settings, &inputs)?;
     assessment.provenance.recording_sha256 = hex::encode(Sha256::digest(&bytes));
+    assessment.performance = Some(protocol::perform(recording.header.protocol.as_deref(), &assessment));
     write(args, &assessment)
 }
 
@@ -131,6 +134,7 @@ fn write(args: &Args, assessment: &Assessment) -> anyhow::Result<()> {
         let document = serde_json::json!({
             "summary": assessment.summary,
             "gait": assessment.gait,
+            "performance": assessment.performance,
             "quality": assessment.quality,
             "provenance": assessment.provenance,
         });
@@ -138,6 +142,7 @@ fn write(args: &Args, assessment: &Assessment) -> anyhow::Result<()> {
     } else {
         print_summary(assessment, &mut out)?;
         assess_legs::print_steps(assessment, &mut out)?;
+        print_performance(assessment, &mut out)?;
     }
     Ok(())
 }
@@ -284,22 +289,29 @@ fn print_summary(assessment: &Assessment, out: &mut dyn Write) -> anyhow::Result
 }
 
 fn write_csv(assessment: &Assessment, path: &Path) -> anyhow::Result<()> {
-    let mut writer = csv::Writer::from_path(path)?;
-    let mut header = vec!["time_s".to_owned()];
-    for series in &assessment.series {
-        header.extend(["", "_low", "_high", "_flags"].map(|part| format!("{}{part}", series.channel)));
+    let mut file = BufWriter::new(fs::File::create(path)?);
+    let samples = Samples { time_ns: assessment.time_ns.clone(), series: assessment.series.clone() };
+    for piece in csv(samples).pieces() {
+        file.write_all(piece.as_bytes())?;
     }
-    writer.write_record(&header)?;
-    let number = |value: f32| if value.is_finite() { value.to_string() } else { String::new() };
-    for (t, time_ns) in assessment.time_ns.iter().enumerate() {
-        let mut row = vec![(*time_ns as f64 * 1e-9).to_string()];
-        for series in &assessment.series {
-            row.extend([number(series.value[t]), number(series.low[t]), number(series.high[t])]);
-            row.push(series.flags[t].to_string());
-        }
-        writer.write_record(&row)?;
+    file.flush()?;
+    Ok(())
+}
+
+fn print_performance(assessment: &Assessment, out: &mut dyn Write) -> anyhow::Result<()> {
+    let Some(performance) = &assessment.performance else { return Ok(()) };
+    let protocol = performance.protocol.as_deref().unwrap_or("no protocol named");
+    let status = serde_json::to_value(performance.status)?;
+    writeln!(out, "\n{protocol}: {} {}", status.as_str().unwrap_or_default(), performance.reason)?;
+    if !performance.repetitions.is_empty() {
+        let complete = performance.repetitions.iter().filter(|repetition| repetition.is_complete).count();
+        writeln!(out, "  {complete} repetitions")?;
     }
-    writer.flush()?;
+    for measure in performance.measures.iter().filter(|measure| measure.value.is_some()) {
+        let side = measure.side.map_or("", |side| side.name());
+        let error = measure.standard_error.map_or_else(String::new, |se| format!(" ± {:.2}", 1.96 * se));
+        writeln!(out, "  {:<40} {side:<6}{:>10.3}{error}", measure.name, measure.value.unwrap_or_default())?;
+    }
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 use crate::assessment::{Assessment, LegPoseSettings};
 use crate::pipeline::leg_pose::{self, Track};
 use crate::progress::Monitor;
+use crate::protocol;
 use crate::recording::decode::{DepthReader, Limits};
 use anyhow::{Context, anyhow};
 use sha2::{Digest, Sha256};
@@ -24,8 +25,10 @@ pub(super) fn assess(
 ) -> anyhow::Result<Option<(Assessment, Track)>> {
     let open = || File::open(path).with_context(|| format!("cannot read {}", path.display()));
     let Ok(reader) = DepthReader::open(BufReader::new(open()?), &Limits::default()) else { return Ok(None) };
+    let declared = reader.header().protocol.clone();
     let assessed = leg_pose::assess_watched(reader, &settings()?, &mut |_, _| {}, &Monitor::default());
     let (mut assessment, track) = assessed.map_err(|error| anyhow!("{error}"))?;
+    assessment.performance = Some(protocol::perform(declared.as_deref(), &assessment));
     let mut digest = Sha256::new();
     let mut file = open()?;
     let mut piece = vec![0; PIECE];

@@ -53,6 +53,11 @@ pub const RULES: &[&Rule] = &[
     &gait_variability::STRIDE_TIME_SD,
 ];
 
+/// The rules that look at a measure.
+pub fn rules_of_measure(name: &str) -> Vec<&'static str> {
+    RULES.iter().filter(|rule| rule.info.measures.contains(&name)).map(|rule| rule.info.id).collect()
+}
+
 /// The finding of every rule.
 pub fn findings(known: &Known) -> Vec<Finding> {
     RULES.iter().map(|rule| rule.apply(known)).collect()

@@ -65,8 +65,6 @@ pub struct Protocol {
     pub measures: &'static [&'static [MeasureSpec]],
     /// How repetitions or holds are found.
     pub method: &'static str,
-    /// Rules of fall risk that its measures feed.
-    pub fall_risk_rules: &'static [&'static str],
     /// Where the test is published.
     pub source: &'static str,
     /// What it is made of.
@@ -78,10 +76,16 @@ pub struct Protocol {
 }
 
 impl Protocol {
-    /// What clients are told of it.
-    pub fn info(&self) -> ProtocolInfo {
+    /// What clients are told of it; `rules_of` names the rules about falls that look at a measure.
+    pub fn info(&self, rules_of: impl Fn(&str) -> Vec<&'static str>) -> ProtocolInfo {
         let owned = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<String>>();
         let measures = self.measures.iter().flat_map(|list| list.iter());
+        let mut fall_risk_rules: Vec<String> = Vec::new();
+        for rule in measures.clone().flat_map(|(name, ..)| rules_of(name)) {
+            if !fall_risk_rules.iter().any(|known| known == rule) {
+                fall_risk_rules.push(rule.to_owned());
+            }
+        }
         ProtocolInfo {
             id: self.id.to_owned(),
             aliases: owned(self.aliases),
@@ -100,15 +104,10 @@ impl Protocol {
                 })
                 .collect(),
             method: self.method.to_owned(),
-            fall_risk_rules: owned(self.fall_risk_rules),
+            fall_risk_rules,
             source: self.source.to_owned(),
         }
     }
-}
-
-/// The catalogue, as clients are told of it.
-pub fn protocols() -> Vec<ProtocolInfo> {
-    PROTOCOLS.iter().map(|protocol| protocol.info()).collect()
 }
 
 /// The protocol of an id or another name of it.

@@ -7,8 +7,9 @@
 use super::motion::{INTERVAL_S, Motion};
 use nalgebra::Vector3;
 
-/// How far an ankle may be from its place in the stand, leg lengths: about five centimetres.
-const FOOT_RADIUS: f64 = 0.06;
+/// How far an ankle may be from its place in the stand, leg lengths: about three centimetres. A foot that is lifted to step
+/// beside the other one goes farther.
+const FOOT_RADIUS: f64 = 0.04;
 
 /// How far a knee may bend from its value at the middle of the stand, degrees: a lifted foot bends it farther.
 const KNEE_CHANGE_DEG: f64 = 25.0;

@@ -121,3 +121,15 @@ async fn an_assessment_is_exported_in_every_form_and_its_joints_can_be_replayed(
     let elsewhere = app.stranger().await;
     app.get(&format!("/v1/assessments/{id}/joints")).key(&elsewhere).send().await.refused(404, "not_found");
 }
+
+#[tokio::test]
+async fn a_protocol_says_which_rules_look_at_its_measures() {
+    let app = TestApp::new().await;
+    let rules_of = async |id: &str| {
+        let found = app.get(&format!("/v1/protocols/{id}")).send().await.expect(StatusCode::OK);
+        found["fall_risk_rules"].as_array().unwrap().iter().map(|rule| text(rule).to_owned()).collect::<Vec<_>>()
+    };
+    assert!(rules_of("five_times_sit_to_stand").await.contains(&"sts5".to_owned()));
+    assert!(rules_of("walk").await.contains(&"speed_slow_ss".to_owned()));
+    assert_eq!(rules_of("back_knee").await, Vec::<String>::new());
+}

@@ -30,7 +30,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[&[ALTERNATE_STEP], OF_EACH_SIDE],
     method: "Repetitions as in `step`; the time runs from the first foot's lift to the eighth foot's return to the floor, and there is one only when eight complete steps follow each other with the feet in turn.",
-    fall_risk_rules: &["quickscreen alternate_step"],
     source: "Tiedemann, Lord, Sherrington 2010, J Gerontol A 65:896-903, doi 10.1093/gerona/glq067",
     movement: Movement::Repeated(1),
     find: step::find,

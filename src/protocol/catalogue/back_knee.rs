@@ -28,7 +28,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[OF_EACH_SIDE],
     method: "Excursions of one knee's flexion of at least 30 degrees while the thigh hangs (it turns by less than half as much), the other knee stays and the foot leaves the floor.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(1),
     find: find,

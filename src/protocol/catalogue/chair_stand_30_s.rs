@@ -33,7 +33,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[&[CHAIR_STANDS], OF_BOTH_SIDES],
     method: "Rises are ways of the mean knee flexion from sitting (both knees and thighs bent, the body's weight behind the feet) to standing; starts and ends lie where the speed falls below 25 % of the rise's largest. Counted are rises that are more than halfway up 30 s after the first start.",
-    fall_risk_rules: &["chair30"],
     source: "CDC STEADI 30-second chair stand, 2017",
     movement: Movement::Repeated(1),
     find: chair::find,

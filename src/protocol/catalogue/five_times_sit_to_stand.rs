@@ -31,7 +31,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[&[FIVE_TIMES], OF_BOTH_SIDES],
     method: "Rises are ways of the mean knee flexion from sitting (both knees and thighs bent, the body's weight behind the feet) to standing; starts and ends lie where the speed falls below 25 % of the rise's largest.",
-    fall_risk_rules: &["sts5", "quickscreen sit_to_stand_5", "sppb_chair"],
     source: "Tiedemann et al. 2008, Age Ageing 37:430-435, doi 10.1093/ageing/afn100",
     movement: Movement::Repeated(1),
     find: chair::find,

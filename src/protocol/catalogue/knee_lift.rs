@@ -28,7 +28,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[OF_EACH_SIDE],
     method: "Excursions of one knee's flexion of at least 40 degrees with the thigh coming forwards by at least 30 degrees and the foot rising by more than 0.3 leg lengths, while the other leg stands.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(1),
     find: find,

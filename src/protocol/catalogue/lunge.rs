@@ -28,7 +28,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "at an angle from the front, two to three metres away: from straight ahead one leg hides the other",
     measures: &[OF_BOTH_SIDES],
     method: "Excursions of the mean knee flexion of at least 25 degrees in which a knee bends by more than 40 degrees while the feet are more than 0.3 leg lengths apart along the facing direction, or the body or a foot goes as far forwards.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(1),
     find: find,

@@ -42,7 +42,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     measures: &[OF_EACH_SIDE],
     method: "Turns of the difference of both knees of at least 10 degrees, with the difference of the thighs turning along, at \
              most 1.2 s apart, a foot rising by less than 0.42 leg lengths and the body staying; three after each other at least.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(FEWEST),
     find: find,

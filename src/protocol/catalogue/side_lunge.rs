@@ -28,7 +28,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[OF_EACH_SIDE],
     method: "Excursions of one knee's flexion of at least 35 degrees while the feet are more than 0.7 leg lengths apart sideways and the other knee bends by less than 0.7 as much.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(1),
     find: find,

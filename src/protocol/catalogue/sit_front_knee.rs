@@ -28,7 +28,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[OF_EACH_SIDE],
     method: "Excursions of one knee's flexion downwards by at least 25 degrees while both thighs stay raised as in sitting and the other knee stays bent.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(1),
     find: find,

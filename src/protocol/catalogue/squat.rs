@@ -29,7 +29,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[OF_BOTH_SIDES],
     method: "Excursions of the mean knee flexion of at least 35 degrees in which both knees and thighs bend together, feet side by side, and the body's weight stays above the feet.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(1),
     find: find,

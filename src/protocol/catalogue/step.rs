@@ -28,7 +28,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[OF_EACH_SIDE],
     method: "Excursions of one knee's flexion of at least 30 degrees with the thigh coming forwards, in which the foot is raised by 0.12 to 0.42 leg lengths, put forwards and brought back, while the other foot stays.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Repeated(1),
     find: find,

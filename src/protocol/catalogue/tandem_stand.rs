@@ -26,7 +26,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "in front, two to three metres away, at hip height, the whole body with both feet in view",
     measures: &[&[HOLD], SWAY],
     method: "Feet more than 0.2 leg lengths apart along the facing direction and less than 0.2 across it; a near tandem stand looks the same. The hold is the longest stretch in which both ankles stay within 0.06 leg lengths, no knee bends and the hips stay high, until a foot moves or the recording ends.",
-    fall_risk_rules: &["tandem10", "sppb_balance"],
     source: "Guralnik et al. 1994, short physical performance battery",
     movement: Movement::Held,
     find: find,

@@ -26,7 +26,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "at the end of the way, at hip height; the whole body must be in view over the way that counts",
     measures: &[&[DISTANCE], OF_FOOTFALLS],
     method: "A walk is a recording in which the pelvis comes more than 1.2 m from where it began; steps are found by the courses of pelvis and feet.",
-    fall_risk_rules: &["wfg2022", "speed_slow_ss"],
     source: "",
     movement: Movement::Walked,
     find: find,

@@ -21,7 +21,6 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     view: "on the walker, looking back and down at the legs",
     measures: &[OF_FOOTFALLS],
     method: "Steps are found in the depth images by the assessment of gait; there are no repetitions of angles.",
-    fall_risk_rules: &[],
     source: "",
     movement: Movement::Walked,
     find: find,

@@ -1,7 +1,7 @@
 //! Joint angles as a Biovision hierarchy: the linked skeleton of the model in place, y up, metres and degrees.
 
 use super::samples::Postures;
-use super::{NotExportable, Samples};
+use super::{Export, NotExportable, Samples};
 use crate::assessment::quality::CalibrationQuality;
 use crate::body::{Limb, Pose, Skeleton};
 use crate::geometry::euler::zxy_from_rotation;
@@ -15,7 +15,7 @@ const AVERAGE_STATURE_M: f64 = 1.7;
 ///
 /// # Errors
 /// [`NotExportable`] for assessments without joint angles of the whole body.
-pub fn bvh(samples: &Samples<'_>, calibration: Option<&CalibrationQuality>) -> Result<String, NotExportable> {
+pub fn bvh(samples: Samples, calibration: Option<&CalibrationQuality>) -> Result<Export, NotExportable> {
     let postures = Postures::of(samples)?;
     let skeleton = skeleton_of(calibration);
     let mut text = String::from("HIERARCHY\nROOT trunk\n{\n");
@@ -29,21 +29,24 @@ pub fn bvh(samples: &Samples<'_>, calibration: Option<&CalibrationQuality>) -> R
         let _ = writeln!(text, "      OFFSET {}\n      CHANNELS 3 Zrotation Xrotation Yrotation", offset(&proximal));
         let _ = writeln!(text, "      End Site\n      {{\n        OFFSET {}\n      }}\n    }}\n  }}", offset(&distal));
     }
-    let rate = samples.rate_hz();
+    let rate = postures.samples().rate_hz();
     let step = if rate > 0.0 { 1.0 / rate } else { 0.0 };
-    let n = samples.time_ns.len();
+    let n = postures.samples().time_ns.len();
     let _ = writeln!(text, "}}\nMOTION\nFrames: {n}\nFrame Time: {step:.6}");
-    for i in 0..n {
-        text.push_str("0 0 0");
-        for rotation in rotations(&postures.at(i)) {
-            let angles = zxy_from_rotation(&rotation);
-            for angle in [angles.first, angles.second, angles.third] {
-                let _ = write!(text, " {:.4}", angle.to_degrees());
+    Ok(Export::new(text, n, move |range| {
+        let mut text = String::new();
+        for i in range {
+            text.push_str("0 0 0");
+            for rotation in rotations(&postures.at(i)) {
+                let angles = zxy_from_rotation(&rotation);
+                for angle in [angles.first, angles.second, angles.third] {
+                    let _ = write!(text, " {:.4}", angle.to_degrees());
+                }
             }
+            text.push('\n');
         }
-        text.push('\n');
-    }
-    Ok(text)
+        text
+    }))
 }
 
 /// Rotation of the trunk, then of each limb's root and hinge against its parent.
@@ -85,8 +88,8 @@ mod tests {
     #[test]
     fn a_hierarchy_has_as_many_numbers_a_frame_as_channels() {
         let series: Vec<Series> = AngleChannel::all().into_iter().map(|c| Series::empty(c.name(), 2)).collect();
-        let samples = Samples { time_ns: &[0, 20_000_000], series: &series };
-        let text = bvh(&samples, None).unwrap();
+        let samples = Samples { time_ns: vec![0, 20_000_000], series };
+        let text: String = bvh(samples, None).unwrap().pieces().collect();
         let channels: usize = text
             .lines()
             .filter_map(|line| line.trim().strip_prefix("CHANNELS "))
@@ -96,6 +99,6 @@ mod tests {
         assert_eq!((channels, frames.len()), (30, 2));
         assert!(frames.iter().all(|frame| frame.split(' ').count() == channels));
         assert_eq!(text.matches('{').count(), text.matches('}').count());
-        assert!(bvh(&Samples { time_ns: &[], series: &[] }, None).is_err());
+        assert!(bvh(Samples { time_ns: Vec::new(), series: Vec::new() }, None).is_err());
     }
 }

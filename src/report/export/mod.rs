@@ -1,4 +1,6 @@
-//! Series and places in the forms that other programs read. Text in, nothing is estimated here.
+//! Series and places in the forms that other programs read. Nothing is estimated here.
+//!
+//! An export is made piece by piece, so that its text is never in memory as a whole.
 
 mod bvh;
 mod csv;
@@ -12,17 +14,35 @@ pub use mot::mot;
 pub use samples::Samples;
 pub use trc::trc;
 
-/// A form of export.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
-    /// Every channel with its interval and flags, as comma separated values.
-    Csv,
-    /// Joint angles as an OpenSim motion file.
-    Mot,
-    /// Joint places as an OpenSim marker file.
-    Trc,
-    /// Joint angles as a Biovision hierarchy.
-    Bvh,
+use std::ops::Range;
+
+/// Rows of one piece.
+const PIECE_ROWS: usize = 256;
+
+/// A text that is made piece by piece.
+pub struct Export {
+    head: String,
+    n_rows: usize,
+    rows: Box<dyn Fn(Range<usize>) -> String + Send>,
+}
+
+impl std::fmt::Debug for Export {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Export").field("n_rows", &self.n_rows).finish_non_exhaustive()
+    }
+}
+
+impl Export {
+    fn new(head: String, n_rows: usize, rows: impl Fn(Range<usize>) -> String + Send + 'static) -> Self {
+        Self { head, n_rows, rows: Box::new(rows) }
+    }
+
+    /// The pieces of the text, in order.
+    pub fn pieces(self) -> impl Iterator<Item = String> + Send {
+        let Self { head, n_rows, rows } = self;
+        let ranges = (0..n_rows).step_by(PIECE_ROWS).map(move |start| start..n_rows.min(start + PIECE_ROWS));
+        std::iter::once(head).chain(ranges.map(rows))
+    }
 }
 
 /// A result that cannot be written in a form.

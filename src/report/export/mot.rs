@@ -5,7 +5,7 @@
 //! hanging (Z-X-Y) there, and as plane and elevation in the assessment.
 
 use super::samples::{Postures, side_letter};
-use super::{NotExportable, Samples};
+use super::{Export, NotExportable, Samples};
 use crate::body::anatomical_angles::{as_right_side, t_posture_from_hanging};
 use crate::body::{Limb, Pose};
 use crate::geometry::euler::zxy_from_rotation;
@@ -15,26 +15,29 @@ use std::fmt::Write;
 ///
 /// # Errors
 /// [`NotExportable`] for assessments without joint angles of the whole body.
-pub fn mot(samples: &Samples<'_>) -> Result<String, NotExportable> {
+pub fn mot(samples: Samples) -> Result<Export, NotExportable> {
     let postures = Postures::of(samples)?;
     let names = coordinate_names();
-    let n = samples.time_ns.len();
-    let mut text = format!(
+    let n = postures.samples().time_ns.len();
+    let mut head = format!(
         "surefoot joint angles\nversion=1\nnRows={n}\nnColumns={}\ninDegrees=yes\nendheader\ntime",
         names.len() + 1
     );
     for name in &names {
-        let _ = write!(text, "\t{name}");
+        let _ = write!(head, "\t{name}");
     }
-    text.push('\n');
-    for i in 0..n {
-        let _ = write!(text, "{:.6}", samples.seconds(i));
-        for angle in coordinates(&postures.at(i)) {
-            let _ = write!(text, "\t{:.5}", angle.to_degrees());
+    head.push('\n');
+    Ok(Export::new(head, n, move |range| {
+        let mut text = String::new();
+        for i in range {
+            let _ = write!(text, "{:.6}", postures.samples().seconds(i));
+            for angle in coordinates(&postures.at(i)) {
+                let _ = write!(text, "\t{:.5}", angle.to_degrees());
+            }
+            text.push('\n');
         }
-        text.push('\n');
-    }
-    Ok(text)
+        text
+    }))
 }
 
 fn coordinate_names() -> Vec<String> {

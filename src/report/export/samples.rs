@@ -7,15 +7,15 @@ use crate::geometry::attitude::rotation_from_attitude;
 use nalgebra::{Rotation3, Vector3};
 
 /// Samples of the channels of an assessment.
-#[derive(Debug, Clone, Copy)]
-pub struct Samples<'a> {
+#[derive(Debug, Clone)]
+pub struct Samples {
     /// Time of each sample on the recording's clock, nanoseconds.
-    pub time_ns: &'a [i64],
+    pub time_ns: Vec<i64>,
     /// The channels, all as long as the times.
-    pub series: &'a [Series],
+    pub series: Vec<Series>,
 }
 
-impl<'a> Samples<'a> {
+impl Samples {
     /// Time of a sample from the first one, seconds.
     pub fn seconds(&self, sample: usize) -> f64 {
         let first = self.time_ns.first().copied().unwrap_or_default();
@@ -29,23 +29,26 @@ impl<'a> Samples<'a> {
         if steps > 0 && span > 0.0 { steps as f64 / span } else { 0.0 }
     }
 
-    fn channel(&self, channel: AngleChannel) -> Option<&'a Series> {
+    /// Place of a channel among the series.
+    fn channel(&self, channel: AngleChannel) -> Option<usize> {
         let name = channel.name();
-        self.series.iter().find(|series| series.channel == name)
+        self.series.iter().position(|series| series.channel == name)
     }
 }
 
 /// Postures of an assessment of joint angles, from its attitude vectors and hinges.
-pub(super) struct Postures<'a> {
-    trunk: [&'a Series; 3],
-    limbs: [[&'a Series; 3]; 4],
-    hinges: [&'a Series; 4],
+pub(super) struct Postures {
+    samples: Samples,
+    /// Places of the channels.
+    trunk: [usize; 3],
+    limbs: [[usize; 3]; 4],
+    hinges: [usize; 4],
 }
 
-impl<'a> Postures<'a> {
-    pub(super) fn of(samples: &Samples<'a>) -> Result<Self, NotExportable> {
+impl Postures {
+    pub(super) fn of(samples: Samples) -> Result<Self, NotExportable> {
         const NONE: NotExportable = NotExportable("this assessment holds no joint angles of the whole body");
-        let attitude = |of: &dyn Fn(usize) -> AngleChannel| -> Result<[&'a Series; 3], NotExportable> {
+        let attitude = |of: &dyn Fn(usize) -> AngleChannel| -> Result<[usize; 3], NotExportable> {
             let axis = |axis: usize| samples.channel(of(axis)).ok_or(NONE);
             Ok([axis(0)?, axis(1)?, axis(2)?])
         };
@@ -64,21 +67,25 @@ impl<'a> Postures<'a> {
             samples.channel(channel).ok_or(NONE)
         };
         let [la, ra, ll, rl] = Limb::ALL;
-        Ok(Self {
-            trunk: attitude(&AngleChannel::TrunkAttitude)?,
-            limbs: [limb(la)?, limb(ra)?, limb(ll)?, limb(rl)?],
-            hinges: [hinge(la)?, hinge(ra)?, hinge(ll)?, hinge(rl)?],
-        })
+        let trunk = attitude(&AngleChannel::TrunkAttitude)?;
+        let limbs = [limb(la)?, limb(ra)?, limb(ll)?, limb(rl)?];
+        let hinges = [hinge(la)?, hinge(ra)?, hinge(ll)?, hinge(rl)?];
+        Ok(Self { samples, trunk, limbs, hinges })
+    }
+
+    /// The samples that the postures are from.
+    pub(super) fn samples(&self) -> &Samples {
+        &self.samples
     }
 
     /// The posture of a sample; parts that were never seen stay in the reference posture.
     pub(super) fn at(&self, sample: usize) -> Pose {
-        let radians = |series: &Series| f64::from(series.value[sample]).to_radians();
-        let rotation = |attitude: &[&Series; 3]| {
+        let radians = |channel: usize| f64::from(self.samples.series[channel].value[sample]).to_radians();
+        let rotation = |attitude: &[usize; 3]| {
             let vector = Vector3::from(attitude.map(radians));
             if vector.iter().all(|v| v.is_finite()) { rotation_from_attitude(&vector) } else { Rotation3::identity() }
         };
-        let hinge = |series: &&Series| Some(radians(series)).filter(|angle| angle.is_finite()).unwrap_or(0.0);
+        let hinge = |channel: &usize| Some(radians(*channel)).filter(|angle| angle.is_finite()).unwrap_or(0.0);
         Pose {
             trunk: rotation(&self.trunk),
             limbs: std::array::from_fn(|limb| rotation(&self.limbs[limb])),

@@ -64,7 +64,7 @@ impl WalkerSimulation {
 
     fn header(&self) -> Header {
         Header {
-            protocol: Some(format!("walker_{}", self.settings().course.name())),
+            protocol: Some("walk_with_walker".to_owned()),
             device: Device { model: Some("kinect-v1".into()), middleware: Some("simulated".into()) },
             subject_height_m: Some(self.settings().stature_m),
             ..Header::default()
