@@ -123,9 +123,8 @@ fn toe_off(frames: &[FeetFrame], side: Side, swing: std::ops::Range<usize>) -> u
 
 /// Speed of a swinging foot against the other one, m/s, and its greatest in the swing.
 fn speeds(frames: &[FeetFrame], side: Side, swing: &std::ops::Range<usize>) -> (impl Fn(usize) -> f64, f64) {
-    let speed = move |k: usize| {
-        (frames[k].velocity[side as usize].y - frames[k].velocity[side.opposite() as usize].y).abs()
-    };
+    let speed =
+        move |k: usize| (frames[k].velocity[side as usize].y - frames[k].velocity[side.opposite() as usize].y).abs();
     (speed, swing.clone().map(speed).fold(0.0, f64::max))
 }
 
