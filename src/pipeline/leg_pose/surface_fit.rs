@@ -44,7 +44,7 @@ const FOOT_DROP: f64 = 0.05;
 /// Height of the ankle's centre above the floor of a standing adult, metres: 0.039 of stature (Winter) and a shoe's sole.
 const ANKLE_HEIGHT: f64 = 0.095;
 /// How much it differs from body to body, and while a foot rolls, metres.
-const ANKLE_SD: f64 = 0.015;
+const ANKLE_SD: f64 = 0.025;
 /// An ankle is not lower than expected by more than this, metres.
 const ANKLE_LOWER: f64 = 0.02;
 /// An ankle that is higher than the other by this much is half as sure to stand, metres.
@@ -122,7 +122,7 @@ fn cones(pose: &PoseVector, shape: &ShapeVector) -> [Cone; SEGMENTS] {
 
 /// Height of a standing ankle of a body of this size: soles do not grow with the body.
 fn ankle_height(size: f64) -> f64 {
-    ANKLE_HEIGHT * (0.5 + 0.5 * size)
+    ANKLE_HEIGHT * (0.6 + 0.4 * size)
 }
 
 /// Side and segment of a place among the six segments.

@@ -24,6 +24,8 @@ const MIN_COVERAGE: f64 = 0.8;
 /// A step during which the walker turns by more than this is part of a turn, radians: a corner in six steps is 15 degrees
 /// a step.
 const TURN: f64 = 5.0 * std::f64::consts::PI / 180.0;
+/// Feet turn before the walker does, which is pushed and heavy: so many steps before one that turns are part of the turn.
+const STEPS_BEFORE_TURN: usize = 2;
 /// Way of a standing foot, metres, on which a bend is half believed: a bend of 2 mm on 0.1 m is 9 degrees.
 const NOTHING_SURE: f64 = 0.1;
 /// Standard deviation of a well-seen standing foot about its path, metres.
@@ -166,7 +168,7 @@ fn steps_of_walk(frames: &[FeetFrame], displacement: &[Vector2<f64>], walk: &[Sw
             }
         };
         exclude("first_or_last", n < END_STEPS || n + END_STEPS >= walk.len());
-        exclude("turning", turns[n].abs() > TURN);
+        exclude("turning", turns[n..].iter().take(1 + STEPS_BEFORE_TURN).any(|turn| turn.abs() > TURN));
         exclude("low_coverage", coverage < MIN_COVERAGE);
         exclude("missed_contact", !alternates);
         let start = frames[0].time;
