@@ -128,7 +128,7 @@ async fn a_report_tells_its_findings_and_what_is_missing() {
     for part in [
         "Report of P-7",
         "0.700\u{a0}m/s",
-        "standard errors beyond it",
+        "standard errors beyond the limit",
         "Accuracy of the tool",
         "must not guide care",
         "That is not a sign of low risk",

@@ -33,19 +33,25 @@ async function open(place) {
   const plots = makePlots(place.querySelector(".plots"), assessment, clock, async (channels) => {
     return read(`${address}/series?channels=${channels.join(",")}&max_points=${MAX_POINTS}`);
   });
-  const wanted = pairs.filter((pair) => FIRST.includes(pair.name));
+  const wanted = FIRST.map((name) => pairs.find((pair) => pair.name === name)).filter(Boolean);
   const first = (wanted.length > 0 ? wanted : pairs).slice(0, FIRST_COUNT);
   chooser(place.querySelector(".choose"), pairs, first, plots);
   for (const button of place.querySelectorAll("[data-zoom]")) {
     button.addEventListener("click", () => plots.zoom(button.dataset.zoom));
   }
   const replay = place.querySelector(".replay");
-  if (joints && joints.time_s.length > 0) makeReplay(replay, joints, clock);
-  else replay.remove();
+  const hasReplay = joints !== null && joints.time_s.length > 0;
+  if (!hasReplay) replay.remove();
   await plots.show(first);
   clock.set(0);
-  // When plots and replay could first be used, milliseconds since the navigation.
+  // When plots could first be used, and the replay: milliseconds since the navigation.
   place.dataset.ready = performance.now().toFixed(0);
+  if (!hasReplay) return;
+  // The plots are painted before the replay starts its graphics, which may take a while.
+  requestAnimationFrame(() => setTimeout(() => {
+    makeReplay(replay, joints, clock);
+    place.dataset.replayReady = performance.now().toFixed(0);
+  }));
 }
 
 function chooser(place, pairs, first, plots) {
