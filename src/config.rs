@@ -22,6 +22,9 @@ pub struct Config {
     pub lease_s: u64,
     /// Times a job is tried before it is given up.
     pub max_attempts: u32,
+    /// True when browsers reach the service through TLS only: cookies of the pages then never travel without it. A proxy that sends
+    /// `X-Forwarded-Proto: https` has the same effect.
+    pub behind_tls: bool,
 }
 
 impl Default for Config {
@@ -34,6 +37,7 @@ impl Default for Config {
             max_json_recording_bytes: 32 << 20,
             lease_s: 30,
             max_attempts: 3,
+            behind_tls: false,
         }
     }
 }

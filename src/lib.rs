@@ -26,6 +26,7 @@
 //! | [`queue`] | durable jobs |
 //! | [`worker`] | claim, load, assess, save |
 //! | [`api`] | HTTP, one file per resource |
+//! | [`pages`] | the clinician's pages: HTML, one file per page |
 //! | [`cli`] | the commands |
 //!
 //! # One recording's journey
@@ -50,6 +51,7 @@ pub mod estimation;
 pub mod evaluation;
 pub mod fall_risk;
 pub mod geometry;
+pub mod pages;
 pub mod pipeline;
 pub mod progress;
 pub mod queue;

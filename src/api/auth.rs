@@ -2,13 +2,21 @@
 //!
 //! A handler says in its arguments whom it serves: [`Caller`] any holder of a key, [`Clinician`] a clinician or an
 //! administrator, [`Admin`] an administrator. The key is looked at before the body.
+//!
+//! Besides a key, a reading request may bring the cookie of somebody who is signed in to the pages: their script reads the same
+//! addresses. A cookie never authorises a request that changes something, so that no other site can make a browser do so.
 
 use super::error::ApiError;
 use super::state::AppState;
-use crate::storage::{Access, ApiKey, Client, Role};
+use crate::storage::{Access, ApiKey, Client, PageToken, Role};
 use axum::extract::FromRequestParts;
-use axum::http::header;
 use axum::http::request::Parts;
+use axum::http::{HeaderMap, Method, header};
+
+/// Name of the cookie that the pages set.
+pub const PAGE_COOKIE: &str = "surefoot_page";
+/// Where a request comes from, as browsers tell it.
+const SEC_FETCH_SITE: &str = "sec-fetch-site";
 
 /// The holder of a valid key.
 #[derive(Debug, Clone)]
@@ -33,7 +41,9 @@ impl FromRequestParts<AppState> for Caller {
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
         const HOW: &str = "This request needs an API key: send the header `Authorization: Bearer surefoot_…`.";
         const UNKNOWN: &str = "This API key is unknown or was revoked. Ask an administrator for a new one.";
-        let header = parts.headers.get(header::AUTHORIZATION).ok_or(ApiError::Unauthenticated(HOW))?;
+        let Some(header) = parts.headers.get(header::AUTHORIZATION) else {
+            return of_reading_page(parts, state).await?.ok_or(ApiError::Unauthenticated(HOW));
+        };
         let header = header.to_str().map_err(|_| ApiError::Unauthenticated(HOW))?;
         let (scheme, key) = header.split_once(' ').ok_or(ApiError::Unauthenticated(HOW))?;
         if !scheme.eq_ignore_ascii_case("bearer") {
@@ -43,6 +53,33 @@ impl FromRequestParts<AppState> for Caller {
         let client = client.ok_or(ApiError::Unauthenticated(UNKNOWN))?;
         Ok(Self { access: client.access(), client })
     }
+}
+
+/// The token in the cookie of the pages.
+pub fn page_token(headers: &HeaderMap) -> Option<PageToken> {
+    let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
+    let pairs = cookies.flat_map(|cookies| cookies.split(';')).filter_map(|pair| pair.trim().split_once('='));
+    pairs.filter(|(name, _)| *name == PAGE_COOKIE).map(|(_, value)| PageToken::from_text(value)).next()
+}
+
+/// Who is signed in to the pages with the cookie of a request; none for others.
+///
+/// # Errors
+/// When the database fails.
+pub async fn caller_of_page(headers: &HeaderMap, state: &AppState) -> Result<Option<Caller>, ApiError> {
+    let Some(token) = page_token(headers) else { return Ok(None) };
+    let client = state.store.client_of_page_session(&token).await?;
+    Ok(client.map(|client| Caller { access: client.access(), client }))
+}
+
+/// The same, of a request that only reads and that no other site has caused.
+async fn of_reading_page(parts: &Parts, state: &AppState) -> Result<Option<Caller>, ApiError> {
+    let site = parts.headers.get(SEC_FETCH_SITE).and_then(|site| site.to_str().ok());
+    let is_own = site.is_none_or(|site| ["same-origin", "none"].contains(&site));
+    if !is_own || ![Method::GET, Method::HEAD].contains(&parts.method) {
+        return Ok(None);
+    }
+    caller_of_page(&parts.headers, state).await
 }
 
 impl FromRequestParts<AppState> for Clinician {

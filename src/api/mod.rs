@@ -51,8 +51,13 @@ const COMPRESS_ABOVE: u64 = 4096;
 /// Headers that no log shows.
 const SECRET_HEADERS: [HeaderName; 2] = [header::AUTHORIZATION, header::COOKIE];
 
-/// Every address of the service.
+/// Every address of the API.
 pub fn router(state: AppState) -> Router {
+    router_with(Router::new(), state)
+}
+
+/// Every address of the API and `others`, which are observed, guarded and compressed in the same way.
+pub fn router_with(others: Router<AppState>, state: AppState) -> Router {
     let (routes, document) = documented_routes().split_for_parts();
     let compressible = SizeAbove::new(COMPRESS_ABOVE)
         .and(NotForContentType::SSE)
@@ -60,6 +65,7 @@ pub fn router(state: AppState) -> Router {
         .and(NotForContentType::const_new("application/vnd.surefoot.mcap"));
     routes
         .merge(docs::router(&openapi::complete(&document)))
+        .merge(others)
         .fallback(|| async { StatusCode::NOT_FOUND })
         .layer(CatchPanicLayer::custom(observe::problem_of_panic))
         .layer(middleware::from_fn(observe::observe))

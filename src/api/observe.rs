@@ -75,9 +75,15 @@ fn request_id(headers: &HeaderMap) -> String {
     given.filter(plain).map_or_else(|| Uuid::now_v7().to_string(), str::to_owned)
 }
 
-/// Every refusal is a problem document, also those that come from the router or a layer, and carries the request's id.
+/// Marks a refusal that has its final form already: a page for a person.
+#[derive(Debug, Clone, Copy)]
+pub struct ForPerson;
+
+/// Every refusal is a problem document, also those that come from the router or a layer, and carries the request's id; unless
+/// it is a page [`ForPerson`].
 fn as_problem(response: Response, id: &str, method: &Method) -> Response {
-    if !(response.status().is_client_error() || response.status().is_server_error()) {
+    let is_refusal = response.status().is_client_error() || response.status().is_server_error();
+    if !is_refusal || response.extensions().get::<ForPerson>().is_some() {
         return response;
     }
     let (mut parts, _) = response.into_parts();

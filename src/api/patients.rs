@@ -170,7 +170,7 @@ async fn list_patients(
     let limit = query.limit.unwrap_or(DEFAULT_LIMIT);
     let wanted = PageRequest { after: id_from_cursor(query.cursor.as_deref())?.map(PatientId), limit };
     let link = PageLink::new("/v1/patients", limit, &[("pseudonym_prefix", query.pseudonym_prefix.clone())]);
-    let filter = PatientFilter { pseudonym_prefix: query.pseudonym_prefix };
+    let filter = PatientFilter { pseudonym_prefix: query.pseudonym_prefix, ..PatientFilter::default() };
     let found = state.store.patients(&caller.access, &filter, &wanted).await?;
     Ok(Json(Page::from_stored(found, &link, |id| id.0, PatientResponse::from)))
 }

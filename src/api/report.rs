@@ -258,7 +258,7 @@ async fn read_report(
 ///
 /// # Errors
 /// When the organisation has no such patient, or the database fails.
-pub(super) async fn report_of(
+pub async fn report_of(
     store: &Store,
     caller: &Caller,
     patient: PatientId,

@@ -1,7 +1,8 @@
 //! `surefoot serve`: the service on one machine.
 
-use crate::api::{self, AppState};
+use crate::api::AppState;
 use crate::config::Config;
+use crate::pages;
 use crate::queue::{Queue, QueueSettings};
 use crate::recording::decode::Limits;
 use crate::storage::Store;
@@ -162,7 +163,7 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
             metrics.run_upkeep();
         }
     });
-    let router = api::router(state);
+    let router = pages::router(state);
     let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let server = tokio::spawn(serving.into_future());
     Ok(Running { addr, admin_key, store, stop, server, workers })
@@ -201,6 +202,7 @@ fn announce(running: &Running, json: bool) {
         return;
     }
     println!("Surefoot listens on {address}");
+    println!("Clinician's pages:  {address}/app");
     println!("API documentation:  {address}/docs");
     if let Some(key) = &running.admin_key {
         println!();

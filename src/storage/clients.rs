@@ -107,7 +107,7 @@ impl fmt::Debug for ApiKey {
     }
 }
 
-fn client_from_row(row: &SqliteRow) -> Result<Client, StorageError> {
+pub(super) fn client_from_row(row: &SqliteRow) -> Result<Client, StorageError> {
     Ok(Client {
         id: row.try_get("id")?,
         organisation_id: row.try_get("organisation_id")?,

@@ -70,6 +70,8 @@ pub struct Patient {
 pub struct PatientFilter {
     /// How the pseudonym begins; upper and lower case differ.
     pub pseudonym_prefix: Option<String>,
+    /// A piece of the pseudonym; upper and lower case are the same.
+    pub pseudonym_part: Option<String>,
 }
 
 fn patient_from_row(row: &SqliteRow) -> Result<Patient, StorageError> {
@@ -186,11 +188,13 @@ impl Store {
              WHERE organisation_id = ?1
                AND id < ?2
                AND (?3 IS NULL OR substr(pseudonym, 1, length(?3)) = ?3)
-             ORDER BY id DESC LIMIT ?4",
+               AND (?4 IS NULL OR instr(lower(pseudonym), lower(?4)) > 0)
+             ORDER BY id DESC LIMIT ?5",
         )
         .bind(access.organisation)
         .bind(page.cursor())
         .bind(&filter.pseudonym_prefix)
+        .bind(&filter.pseudonym_part)
         .bind(page.rows())
         .fetch_all(self.reader())
         .await?;

@@ -198,7 +198,7 @@ async fn patients_are_paged_newest_first_and_found_by_the_beginning_of_their_pse
         }
     }
     assert_eq!(seen, ["P-7", "50%_-6", "P-5", "50%_-4", "P-3", "50%_-2", "P-1"]);
-    let prefixed = PatientFilter { pseudonym_prefix: Some("50%_".into()) };
+    let prefixed = PatientFilter { pseudonym_prefix: Some("50%_".into()), ..PatientFilter::default() };
     let found = clinic.store.patients(&clinic.admin, &prefixed, &PageRequest::first(9)).await.unwrap();
     assert_eq!((found.items.len(), found.next), (3, None));
 }

@@ -1,0 +1,101 @@
+//! The list of patients, with search.
+
+use super::access::{HOME, Visitor, escaped};
+use super::error::PageError;
+use super::frame::{Frame, page};
+use super::words;
+use crate::api::AppState;
+use crate::api::page::{cursor_from_id, id_from_cursor};
+use crate::storage::{PageRequest, Patient, PatientFilter, PatientId};
+use askama::Template;
+use axum::extract::{Query, State};
+use axum::response::Html;
+use serde::Deserialize;
+
+/// Patients of a page.
+const PATIENTS: u32 = 25;
+/// Longest piece of a pseudonym that can be searched for, characters.
+const LONGEST_SEARCH: usize = 64;
+
+/// What is searched for, and where the page begins.
+#[derive(Debug, Deserialize)]
+pub(super) struct SearchQuery {
+    /// A piece of the pseudonym.
+    #[serde(default)]
+    q: String,
+    cursor: Option<String>,
+}
+
+#[derive(Template)]
+#[template(path = "patients.html")]
+struct PatientsPage {
+    frame: Frame,
+    search: String,
+    patients: Vec<PatientRow>,
+    /// Address of the next page.
+    next: Option<String>,
+    is_first: bool,
+}
+
+struct PatientRow {
+    id: PatientId,
+    pseudonym: String,
+    born: String,
+    sex: &'static str,
+    walking_aid: &'static str,
+    since: String,
+    last_session: String,
+}
+
+/// The list.
+pub(super) async fn show(
+    State(state): State<AppState>,
+    Visitor(caller): Visitor,
+    Query(query): Query<SearchQuery>,
+) -> Result<Html<String>, PageError> {
+    let search = query.q.trim().to_owned();
+    if search.chars().count() > LONGEST_SEARCH {
+        return Err(PageError::Unclear(format!("Search for at most {LONGEST_SEARCH} characters.")));
+    }
+    let after = id_from_cursor(query.cursor.as_deref())?.map(PatientId);
+    let filter =
+        PatientFilter { pseudonym_part: (!search.is_empty()).then(|| search.clone()), ..PatientFilter::default() };
+    let found = state.store.patients(&caller.access, &filter, &PageRequest { after, limit: PATIENTS }).await?;
+    let next = found.next.map(|last| format!("{HOME}?q={}&cursor={}", escaped(&search), cursor_from_id(last.0)));
+    let mut patients = Vec::with_capacity(found.items.len());
+    for patient in found.items {
+        let last = state.store.recent_sessions(&caller.access, patient.id, state.store.now(), 1).await?;
+        let last_session = last.first().map_or_else(|| "none yet".to_owned(), |last| words::day(last.started_at));
+        patients.push(PatientRow::of(patient, last_session));
+    }
+    Ok(page(&PatientsPage {
+        frame: Frame::of(&caller, "Patients"),
+        search,
+        patients,
+        next,
+        is_first: after.is_none(),
+    })?)
+}
+
+impl PatientRow {
+    fn of(patient: Patient, last_session: String) -> Self {
+        Self {
+            id: patient.id,
+            pseudonym: patient.pseudonym,
+            born: patient.birth_year.map_or_else(|| "not known".to_owned(), |year| year.to_string()),
+            sex: patient.sex.map_or("not known", |sex| sex.name()),
+            walking_aid: yes_no(patient.uses_walking_aid),
+            since: words::day(patient.created_at),
+            last_session,
+        }
+    }
+}
+
+/// Yes, no, or that nobody has said.
+pub(super) fn yes_no(answer: Option<bool>) -> &'static str {
+    match answer {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "not known",
+    }
+}
