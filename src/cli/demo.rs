@@ -93,7 +93,8 @@ pub async fn run(args: &Args) -> anyhow::Result<()> {
         return verdict(outcome?);
     }
     let address = running.addr;
-    println!("\nAPI documentation: http://{address}/docs");
+    println!("\nClinician's pages: http://{address}/app");
+    println!("API documentation: http://{address}/docs");
     println!("Your key:          {key}");
     println!("Ctrl-C ends it.");
     serve::until_told_to_end(running).await

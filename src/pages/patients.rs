@@ -62,12 +62,13 @@ pub(super) async fn show(
         PatientFilter { pseudonym_part: (!search.is_empty()).then(|| search.clone()), ..PatientFilter::default() };
     let found = state.store.patients(&caller.access, &filter, &PageRequest { after, limit: PATIENTS }).await?;
     let next = found.next.map(|last| format!("{HOME}?q={}&cursor={}", escaped(&search), cursor_from_id(last.0)));
-    let mut patients = Vec::with_capacity(found.items.len());
-    for patient in found.items {
-        let last = state.store.recent_sessions(&caller.access, patient.id, state.store.now(), 1).await?;
-        let last_session = last.first().map_or_else(|| "none yet".to_owned(), |last| words::day(last.started_at));
-        patients.push(PatientRow::of(patient, last_session));
-    }
+    let ids: Vec<PatientId> = found.items.iter().map(|patient| patient.id).collect();
+    let last = state.store.last_sessions_of(&caller.access, &ids).await?;
+    let row = |patient: Patient| {
+        let last = last.get(&patient.id).map_or_else(|| "none yet".to_owned(), |time| words::day(*time));
+        PatientRow::of(patient, last)
+    };
+    let patients = found.items.into_iter().map(row).collect();
     Ok(page(&PatientsPage {
         frame: Frame::of(&caller, "Patients"),
         search,

@@ -4,6 +4,7 @@ use super::clock::ms_from_time;
 use super::{Access, ClientId, Page, PageRequest, PatientId, SessionId, StorageError, Store, row};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use std::collections::HashMap;
 use time::OffsetDateTime;
 
 /// A session to be made.
@@ -112,6 +113,29 @@ impl Store {
         .await?
         .ok_or(StorageError::not_found("session"))?;
         session_from_row(&row)
+    }
+
+    /// When the latest session of each of some patients of the organisation began; those without a session are left out.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn last_sessions_of(
+        &self,
+        access: &Access,
+        patients: &[PatientId],
+    ) -> Result<HashMap<PatientId, OffsetDateTime>, StorageError> {
+        // As hexadecimal digits, which is how JSON can carry what the column holds as bytes.
+        let ids: Vec<String> = patients.iter().map(|id| id.0.simple().to_string()).collect();
+        let list = serde_json::to_string(&ids).map_err(|error| StorageError::Corrupt(error.to_string()))?;
+        let rows = sqlx::query(
+            "SELECT patient_id, max(started_at) AS started_at FROM sessions
+             WHERE organisation_id = ?1 AND patient_id IN (SELECT unhex(value) FROM json_each(?2)) GROUP BY patient_id",
+        )
+        .bind(access.organisation)
+        .bind(list)
+        .fetch_all(self.reader())
+        .await?;
+        rows.iter().map(|row| Ok((row.try_get("patient_id")?, row::time(row, "started_at")?))).collect()
     }
 
     /// The sessions within the caller's reach, newest first.
