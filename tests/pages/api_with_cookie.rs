@@ -24,7 +24,8 @@ async fn a_cookie_changes_nothing_at_the_api() {
     let clinic = Clinic::open().await;
     let patient = clinic.followed_patient("P-7").await;
     let cookie = clinic.cookie_of(&clinic.key).await;
-    let headers = [("cookie", cookie.as_str()), ("content-type", "application/json"), ("sec-fetch-site", "same-origin")];
+    let headers =
+        [("cookie", cookie.as_str()), ("content-type", "application/json"), ("sec-fetch-site", "same-origin")];
     for (method, path) in [
         (Method::POST, "/v1/patients".to_owned()),
         (Method::PATCH, format!("/v1/patients/{patient}")),

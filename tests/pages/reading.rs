@@ -23,7 +23,9 @@ async fn every_page_forbids_what_is_not_its_own_and_is_not_kept() {
     for page in pages {
         let answer = clinic.get(page, &cookie).await;
         let policy = answer.header("content-security-policy");
-        for part in ["default-src 'none'", "script-src 'self'", "style-src 'self'", "frame-ancestors 'none'", "base-uri 'none'"] {
+        for part in
+            ["default-src 'none'", "script-src 'self'", "style-src 'self'", "frame-ancestors 'none'", "base-uri 'none'"]
+        {
             assert!(policy.contains(part), "{page}: {policy}");
         }
         assert!(!policy.contains("unsafe"), "{policy}");
@@ -66,7 +68,15 @@ async fn patients_are_found_by_a_piece_of_their_pseudonym_in_pages() {
     let rows = |body: &str| body.matches("<th scope=\"row\">").count();
     let first = clinic.get("/app/patients?q=wARD", &cookie).await.body;
     assert_eq!(rows(&first), 25);
-    let next = first.split("rel=\"next\" href=\"").nth(1).unwrap().split('"').next().unwrap().replace("&amp;", "&").replace("&#38;", "&");
+    let next = first
+        .split("rel=\"next\" href=\"")
+        .nth(1)
+        .unwrap()
+        .split('"')
+        .next()
+        .unwrap()
+        .replace("&amp;", "&")
+        .replace("&#38;", "&");
     let second = clinic.get(&next, &cookie).await.body;
     assert_eq!((rows(&second), second.contains("rel=\"next\"")), (5, false));
     assert_eq!(rows(&clinic.get("/app/patients?q=-07", &cookie).await.body), 1);
@@ -118,7 +128,7 @@ async fn a_report_tells_its_findings_and_what_is_missing() {
     for part in [
         "Report of P-7",
         "0.700\u{a0}m/s",
-        "standard errors beyond it",
+        "standard errors beyond the limit",
         "Accuracy of the tool",
         "must not guide care",
         "That is not a sign of low risk",
@@ -157,7 +167,14 @@ async fn a_recording_is_followed_from_its_upload_to_its_assessment() {
     let own = clinic.get(&format!("/app/recordings/{recording}"), &cookie).await;
     assert_eq!(own.header("location"), format!("/app/sessions/{session}#recording-{recording}"));
     let page = clinic.get(&format!("/app/assessments/{assessment}"), &cookie).await.body;
-    for part in ["Right knee flexion", "export?form=trc", "method iekf", "How far to trust it", "not a diagnosis", "data-joints"] {
+    for part in [
+        "Right knee flexion",
+        "export?form=trc",
+        "method iekf",
+        "How far to trust it",
+        "not a diagnosis",
+        "data-joints",
+    ] {
         assert!(page.contains(part), "no `{part}` in {page}");
     }
 }

@@ -92,7 +92,8 @@ impl Clinic {
 
     /// Sends the sign-in form as a browser does.
     pub async fn sign_in(&self, key: &str, more: &[(&str, &str)]) -> Answer {
-        let mut headers = vec![("content-type", "application/x-www-form-urlencoded"), ("sec-fetch-site", "same-origin")];
+        let mut headers =
+            vec![("content-type", "application/x-www-form-urlencoded"), ("sec-fetch-site", "same-origin")];
         headers.extend(more);
         self.send(Method::POST, "/app/sign-in", &headers, format!("key={key}&next=%2Fapp%2Fpatients")).await
     }

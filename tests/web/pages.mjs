@@ -189,8 +189,13 @@ async function inLight() {
   await context.close();
 }
 
-const clockOf = async (page) => Number((await page.textContent(".clock")).replace(" s", ""));
-const rangeOf = (page) => page.evaluate(() => ["from", "to"].map((end) => Number(document.querySelector(".plots").dataset[end])));
+async function clockOf(page) {
+  return Number((await page.textContent(".clock")).replace(" s", ""));
+}
+
+function rangeOf(page) {
+  return page.evaluate(() => ["from", "to"].map((end) => Number(document.querySelector(".plots").dataset[end])));
+}
 
 async function viewerByKeyboard(page) {
   await page.focus(".scrub");

@@ -33,7 +33,7 @@ async function open(place) {
   const plots = makePlots(place.querySelector(".plots"), assessment, clock, async (channels) => {
     return read(`${address}/series?channels=${channels.join(",")}&max_points=${MAX_POINTS}`);
   });
-  const wanted = pairs.filter((pair) => FIRST.includes(pair.name));
+  const wanted = FIRST.map((name) => pairs.find((pair) => pair.name === name)).filter(Boolean);
   const first = (wanted.length > 0 ? wanted : pairs).slice(0, FIRST_COUNT);
   chooser(place.querySelector(".choose"), pairs, first, plots);
   for (const button of place.querySelectorAll("[data-zoom]")) {

@@ -228,14 +228,10 @@ pub(super) fn segment_rows(quality: &Quality) -> Vec<SegmentRow> {
 
 pub(super) fn provenance(assessment: &StoredAssessment) -> Vec<(&'static str, String)> {
     let provenance = &assessment.provenance;
-    let noise_model = provenance.noise_model.as_ref().and_then(|model| serde_json::to_value(model).ok());
-    let text_of = |value: &serde_json::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-    let noise_model = noise_model.map(|model| match model.as_object() {
-        Some(fields) => {
-            let pairs: Vec<String> = fields.iter().map(|(name, value)| format!("{name} {}", text_of(value))).collect();
-            pairs.join(", ")
-        }
-        None => text_of(&model),
+    let noise_model = provenance.noise_model.as_ref().map(|model| match (model.version, &model.sha256) {
+        (Some(version), Some(sha256)) => format!("{}@{version}, SHA-256 {sha256}", model.name),
+        (Some(version), None) => format!("{}@{version}", model.name),
+        (None, _) => model.name.clone(),
     });
     vec![
         ("Software", format!("Surefoot {}", provenance.software_version)),

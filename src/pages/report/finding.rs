@@ -14,7 +14,6 @@ pub(super) struct FindingView {
     pub value: String,
     pub interval: String,
     pub cutoff: String,
-    pub distance: String,
     pub n_observations: String,
     pub probability: String,
     pub population: &'static str,
@@ -23,6 +22,7 @@ pub(super) struct FindingView {
     pub evidence: &'static str,
     pub is_unconfirmed: bool,
     pub accuracy: &'static str,
+    /// Why, with the distance from the limit in standard errors where there is one.
     pub reason: String,
 }
 
@@ -60,10 +60,6 @@ impl FindingView {
             _ if finding.value.is_some() => "not known".to_owned(),
             _ => String::new(),
         };
-        let distance = finding.distance_se.map_or_else(String::new, |distance| {
-            let side = if distance >= 0.0 { "beyond" } else { "short of" };
-            format!("{:.1} standard errors {side} it", distance.abs())
-        });
         let probability = finding.probability.map_or_else(String::new, |[low, high]| {
             if low == high {
                 words::percent(low)
@@ -80,7 +76,6 @@ impl FindingView {
             value,
             interval,
             cutoff: cutoff.map_or_else(String::new, |cutoff| words::cutoff(cutoff, unit)),
-            distance,
             n_observations: finding.n_observations.map_or_else(String::new, |n| n.to_string()),
             probability,
             population: finding.population,
@@ -176,9 +171,7 @@ mod tests {
         let findings = findings(&known);
         let tug = findings.iter().find(|finding| finding.rule_id == "tug").map(FindingView::of).unwrap();
         assert_eq!((tug.value.as_str(), tug.cutoff.as_str()), ("16.0\u{a0}s", "more than 15.0\u{a0}s"));
-        assert_eq!(
-            (tug.interval.as_str(), tug.distance.as_str()),
-            ("15.0 to 17.0\u{a0}s", "2.0 standard errors beyond it")
-        );
+        assert_eq!(tug.interval, "15.0 to 17.0\u{a0}s");
+        assert_eq!(tug.reason, "2.0 standard errors beyond the limit");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::assessment::PerformanceStatus;
 use crate::body::Side;
-use crate::fall_risk::Evidence;
+use crate::fall_risk::{ChangeInfo, Evidence};
 use crate::pages::sparkline::sparkline;
 use crate::pages::words;
 use crate::report::patient_report::RecentRecording;
@@ -16,16 +16,22 @@ pub(super) struct TrendView {
     pub svg: String,
     pub course: String,
     pub changes: Vec<ChangeView>,
+    /// The published limits that the changes were held against.
+    pub limits: Vec<LimitView>,
     pub left_out: String,
 }
 
 /// A difference and what it means.
 pub(super) struct ChangeView {
+    /// From when, and by how much.
     pub since: String,
-    pub difference: String,
     pub verdict: &'static str,
     pub class: &'static str,
     pub reason: String,
+}
+
+/// A published limit of change.
+pub(super) struct LimitView {
     pub source: String,
     pub is_unconfirmed: bool,
 }
@@ -44,11 +50,9 @@ impl TrendView {
                 _ => format!("{value} on {}; the only value", words::day(newest.measured_at)),
             }
         });
-        let change = |since: &str, change: &Option<Change>| {
-            change.as_ref().map(|change| ChangeView::of(since, change, &trend.unit))
-        };
-        let changes =
-            [change("the value before", &trend.since_previous), change("the first value shown", &trend.since_first)];
+        let both = [&trend.since_previous, &trend.since_first].into_iter().flatten();
+        let mut rules: Vec<ChangeInfo> = both.filter_map(|change| change.rule).collect();
+        rules.dedup();
         let left_out = match trend.n_other_definitions {
             0 => String::new(),
             n => format!("{} of another definition left out: not comparable", words::count(n)),
@@ -57,39 +61,52 @@ impl TrendView {
             title: with_side(&trend.title, trend.side),
             svg: sparkline(trend),
             course,
-            changes: changes.into_iter().flatten().collect(),
+            changes: changes(trend),
+            limits: rules.iter().map(LimitView::of).collect(),
             left_out,
         }
     }
 }
 
+/// The changes of a trend; one sentence for both where the same is to be said of them.
+fn changes(trend: &Trend) -> Vec<ChangeView> {
+    let previous = trend.since_previous.as_ref().map(|change| ChangeView::of("the value before", change, &trend.unit));
+    let first = trend.since_first.as_ref().map(|change| ChangeView::of("the first value shown", change, &trend.unit));
+    match (previous, first) {
+        (Some(previous), Some(first)) if previous.reason == first.reason => {
+            vec![ChangeView { since: format!("{} and {}", previous.since, first.since), ..previous }]
+        }
+        (previous, first) => previous.into_iter().chain(first).collect(),
+    }
+}
+
 impl ChangeView {
     fn of(since: &str, change: &Change, unit: &str) -> Self {
+        const LIMIT: &str = "minimal detectable change";
         let (verdict, class) = match change.verdict {
             ChangeVerdict::Changed => ("Changed", "changed"),
             ChangeVerdict::WithinError => ("No change shown", "steady"),
             ChangeVerdict::Unknown => ("Not known", "unknown"),
         };
         let limit = change.minimal_detectable_change.map(|mdc| words::quantity(mdc, unit));
-        let limit = limit.map_or_else(String::new, |limit| format!(" (minimal detectable change {limit})"));
-        let source = change.rule.map_or_else(String::new, |rule| {
-            format!(
-                "{}/{}: {}; {}; {}",
-                rule.id,
-                rule.version,
-                rule.citation,
-                rule.population,
-                words::evidence(rule.evidence)
-            )
-        });
+        let reason = match limit {
+            Some(limit) if change.reason.contains(LIMIT) => {
+                change.reason.replace(LIMIT, &format!("{LIMIT} of {limit}"))
+            }
+            Some(limit) => format!("{} ({LIMIT} {limit})", change.reason),
+            None => change.reason.clone(),
+        };
+        let difference = words::difference(change.difference, unit);
+        Self { since: format!("{since} on {} ({difference})", words::day(change.from)), verdict, class, reason }
+    }
+}
+
+impl LimitView {
+    fn of(rule: &ChangeInfo) -> Self {
+        let evidence = words::evidence(rule.evidence);
         Self {
-            since: format!("{since}, {}", words::day(change.from)),
-            difference: words::difference(change.difference, unit),
-            verdict,
-            class,
-            reason: format!("{}{limit}", change.reason),
-            source,
-            is_unconfirmed: change.rule.is_some_and(|rule| rule.evidence == Evidence::Unconfirmed),
+            source: format!("{}/{}: {}; {}; {evidence}", rule.id, rule.version, rule.citation, rule.population),
+            is_unconfirmed: rule.evidence == Evidence::Unconfirmed,
         }
     }
 }
@@ -224,4 +241,47 @@ impl RecordingView {
 
 fn named(protocol: Option<&str>) -> String {
     protocol.map_or_else(|| "No protocol named".to_owned(), words::spoken)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use time::{Duration, OffsetDateTime};
+
+    fn record(day: i64, value: f64) -> MeasureRecord {
+        let at = OffsetDateTime::UNIX_EPOCH + Duration::days(day);
+        MeasureRecord {
+            id: Uuid::nil(),
+            name: "usual_speed_mps".to_owned(),
+            title: "Walking speed, usual".to_owned(),
+            side: None,
+            value,
+            unit: "m/s".to_owned(),
+            standard_error: Some(0.02),
+            n_observations: None,
+            error_sd: None,
+            definition: None,
+            protocol: None,
+            reason: String::new(),
+            source: MeasureSource::Entered { measurement_id: Uuid::nil() },
+            measured_at: at,
+            created_at: at,
+        }
+    }
+
+    #[test]
+    fn what_holds_of_both_changes_is_said_once_with_both_differences() {
+        let trend = Trend::of(&[record(0, 1.0), record(7, 1.02), record(14, 1.01)]).unwrap();
+        let view = TrendView::of(&trend);
+        assert_eq!((view.changes.len(), view.limits.len(), view.changes[0].verdict), (1, 1, "No change shown"));
+        assert!(view.changes[0].since.contains("\u{2212}0.010") && view.changes[0].since.contains("+0.010"));
+        assert!(view.changes[0].reason.contains("minimal detectable change of 0.180"), "{}", view.changes[0].reason);
+    }
+
+    #[test]
+    fn a_change_since_the_first_value_alone_is_not_hidden_behind_a_steady_one() {
+        let trend = Trend::of(&[record(0, 1.5), record(7, 1.02), record(14, 1.01)]).unwrap();
+        let verdicts: Vec<&str> = TrendView::of(&trend).changes.iter().map(|change| change.verdict).collect();
+        assert_eq!(verdicts, ["No change shown", "Changed"]);
+    }
 }
