@@ -7,13 +7,13 @@ use crate::body::Side;
 use std::fmt::Write;
 
 /// Scale of the drawing, its unit per metre.
-const PER_M: f64 = 100.0;
+const PER_M: f64 = 160.0;
 /// Half length and half width of a footprint as it is drawn, metres; the foot's own size is not measured.
 const PRINT_M: [f64; 2] = [0.12, 0.045];
 /// Steps of one row.
 const STEPS_OF_ROW: usize = 14;
 /// Height of one row and room at its ends, in the drawing's unit.
-const ROW: f64 = 78.0;
+const ROW: f64 = 96.0;
 const MARGIN: f64 = 24.0;
 /// Steps that are drawn at most; a map of more cannot be read.
 const MOST_STEPS: usize = 140;

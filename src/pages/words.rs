@@ -75,7 +75,7 @@ pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     // Nearly all is not all, and nearly nothing is not nothing.
     let text = match percent {
-        p if p < 100.0 && p >= 99.5 => "more than 99".to_owned(),
+        p if (99.5..100.0).contains(&p) => "more than 99".to_owned(),
         p if p > 0.0 && p < 0.5 => "less than 1".to_owned(),
         p => format!("{p:.0}"),
     };

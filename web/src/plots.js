@@ -129,7 +129,7 @@ export function makePlots(place, assessment, clock, load) {
     });
     chart.root.setAttribute("role", "img");
     chart.root.setAttribute("aria-label",
-      `${pair.title} over time with 95 % intervals${pair.channels.length > 1 ? ", left and right" : ""}; the table of all angles holds its numbers`);
+      `${pair.title} over time with 95 % intervals${pair.channels.length > 1 ? ", left and right" : ""}; the table of all series holds its numbers`);
     return { chart, readout, pair, parts, time, flagNames: series.flag_names };
   }
 

@@ -40,12 +40,18 @@ async function open(place) {
     button.addEventListener("click", () => plots.zoom(button.dataset.zoom));
   }
   const replay = place.querySelector(".replay");
-  if (joints && joints.time_s.length > 0) makeReplay(replay, joints, clock);
-  else replay.remove();
+  const hasReplay = joints !== null && joints.time_s.length > 0;
+  if (!hasReplay) replay.remove();
   await plots.show(first);
   clock.set(0);
-  // When plots and replay could first be used, milliseconds since the navigation.
+  // When plots could first be used, and the replay: milliseconds since the navigation.
   place.dataset.ready = performance.now().toFixed(0);
+  if (!hasReplay) return;
+  // The plots are painted before the replay starts its graphics, which may take a while.
+  requestAnimationFrame(() => setTimeout(() => {
+    makeReplay(replay, joints, clock);
+    place.dataset.replayReady = performance.now().toFixed(0);
+  }));
 }
 
 function chooser(place, pairs, first, plots) {

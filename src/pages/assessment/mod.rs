@@ -41,6 +41,8 @@ struct AssessmentPage {
     footfalls: Option<FootfallMap>,
     channels: Vec<ChannelRow>,
     has_joints: bool,
+    /// Whether there are joint angles, which some downloads need.
+    has_angles: bool,
     event_counts: Vec<(String, u64, u64)>,
     events: Vec<EventRow>,
     n_events: usize,
@@ -88,11 +90,16 @@ pub(super) async fn show(
         protocol: protocol.map_or_else(|| "No protocol named".to_owned(), words::spoken),
         name: format!("{}, method {}", words::spoken(&assessment.pipeline), assessment.method),
         facts,
-        warnings: quality.warnings.iter().map(|warning| (warning.code.clone(), warning.message.clone())).collect(),
+        warnings: quality
+            .warnings
+            .iter()
+            .map(|warning| (warning.code.clone(), words::sentence(&warning.message)))
+            .collect(),
         performance: assessment.performance.as_ref().map(performance),
         gait: assessment.gait.as_ref().map(GaitView::of),
         footfalls: assessment.gait.as_ref().and_then(FootfallMap::of),
         channels: channel_rows(&assessment.summary),
+        has_angles: assessment.channels.iter().any(|channel| channel.ends_with("_flexion_deg")),
         has_joints: joints.is_some_and(|track| !track.is_empty()),
         event_counts: quality.event_counts.iter().map(|c| (words::spoken(&c.kind), c.n_events, c.n_frames)).collect(),
         events,

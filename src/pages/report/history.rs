@@ -234,7 +234,7 @@ impl RecordingView {
             assessment: recording.assessment_id,
             coverage: recording.coverage.map_or_else(String::new, words::percent),
             performance,
-            warnings: recording.warnings.iter().map(|warning| warning.message.clone()).collect(),
+            warnings: recording.warnings.iter().map(|warning| words::sentence(&warning.message)).collect(),
         }
     }
 }
