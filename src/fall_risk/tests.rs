@@ -277,10 +277,9 @@ fn answers_that_contradict_each_other_are_named() {
 #[test]
 fn speed_norm_compares_with_the_mean_of_age_and_sex_and_has_no_status() {
     let known = |age: f64, speed: f64| {
-        let mut known = Known::default();
-        known.person = Person { age_years: Some(age), sex: Some(Sex::Female), ..Person::default() };
-        known.measures.usual_speed_mps = Some(Measured::of(speed));
-        known
+        let person = Person { age_years: Some(age), sex: Some(Sex::Female), ..Person::default() };
+        let measures = Measures { usual_speed_mps: Some(Measured::of(speed)), ..Measures::default() };
+        Known { person, measures, ..Known::default() }
     };
     let of = |age, speed| gait_speed::SPEED_NORM.apply(&known(age, speed));
     assert_eq!(of(80.0, 0.843).reason, "-0.10 m/s against a mean of 0.94 m/s");
