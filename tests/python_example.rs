@@ -1,8 +1,6 @@
 //! The Python examples: a recording that decodes, and a home app that records, uploads, waits and shows the report. They run
 //! when Python with the `mcap` package is there.
 
-#![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
-
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use surefoot::body::Joint;

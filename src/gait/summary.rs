@@ -33,6 +33,9 @@ pub enum StepSelection {
     All,
 }
 
+/// A part of a stride, percent.
+type ShareOfStride = fn(&StridePhases) -> f64;
+
 /// The measures of contacts in order of time, as their exclusions are marked.
 pub fn measures(
     contacts: &[GaitContact],
@@ -86,7 +89,7 @@ fn phases(strides: &[&StepValues]) -> Vec<PerformanceMeasure> {
     }
     found.extend(stance.variability("stance_time_s", &None));
     found.extend(of(&|p, _| p.swing_s).all("swing_time_s", &None));
-    let shares: [(&str, fn(&StridePhases) -> f64); 4] = [
+    let shares: [(&str, ShareOfStride); 4] = [
         ("stance_pct", |p| p.stance_s),
         ("swing_pct", |p| p.swing_s),
         ("double_support_pct", |p| p.double_support_s),

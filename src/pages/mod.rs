@@ -1,8 +1,8 @@
 //! The clinician's pages, under `/app`: written on the server, readable without a script, printed as they are.
 //!
 //! A page asks the storage what the API would ask, and fills a template of `web/templates`. One script and one style sheet
-//! ([`bundle`]) come from this binary; the script reads the API of the same origin with the visitor's cookie. Nothing comes from
-//! outside, and the content security policy of [`headers`] forbids that it ever does.
+//! (`bundle`) come from this binary; the script reads the API of the same origin with the visitor's cookie. Nothing comes from
+//! outside, and the content security policy of `headers` forbids that it ever does.
 
 mod access;
 mod assessment;

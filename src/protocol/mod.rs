@@ -1,8 +1,8 @@
 //! Exercises and tests that a recording can hold: which movement it is, its repetitions, and what is measured of them.
 //!
-//! Pure: an [`Assessment`] in, a [`Performance`] out. [`motion`] puts angles and places on one grid; each protocol of
+//! Pure: an `Assessment` in, a `Performance` out. [`motion`] puts angles and places on one grid; each protocol of
 //! [`catalogue`] says which excursions of which angle are its repetitions ([`repetitions`], on [`transition`]) or which stand
-//! is its hold ([`stance`]); [`recognition`] asks all of them, so that a movement declared as another one gets no numbers.
+//! is its hold ([`stance`]); `recognition` asks all of them, so that a movement declared as another one gets no numbers.
 //!
 //! A new protocol is a file in [`catalogue`] and a line in its `mod.rs`.
 

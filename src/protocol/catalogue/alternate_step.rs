@@ -33,7 +33,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     source: "Tiedemann, Lord, Sherrington 2010, J Gerontol A 65:896-903, doi 10.1093/gerona/glq067",
     movement: Movement::Repeated(1),
     find: step::find,
-    measure: measure,
+    measure,
 };
 
 fn measure(motion: &Motion, found: &Found) -> Vec<PerformanceMeasure> {

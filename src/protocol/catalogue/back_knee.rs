@@ -30,7 +30,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of one knee's flexion of at least 30 degrees while the thigh hangs (it turns by less than half as much), the other knee stays and the foot leaves the floor.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

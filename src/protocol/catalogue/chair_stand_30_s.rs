@@ -36,7 +36,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     source: "CDC STEADI 30-second chair stand, 2017",
     movement: Movement::Repeated(1),
     find: chair::find,
-    measure: measure,
+    measure,
 };
 
 fn measure(motion: &Motion, found: &Found) -> Vec<PerformanceMeasure> {

@@ -34,7 +34,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     source: "Tiedemann et al. 2008, Age Ageing 37:430-435, doi 10.1093/ageing/afn100",
     movement: Movement::Repeated(1),
     find: chair::find,
-    measure: measure,
+    measure,
 };
 
 fn measure(motion: &Motion, found: &Found) -> Vec<PerformanceMeasure> {

@@ -30,7 +30,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of one knee's flexion of at least 40 degrees with the thigh coming forwards by at least 30 degrees and the foot rising by more than 0.3 leg lengths, while the other leg stands.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

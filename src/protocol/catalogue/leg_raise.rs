@@ -30,7 +30,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of one hip's flexion of at least 30 degrees while its knee bends by less than half as much and the other leg stands.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

@@ -30,7 +30,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of the mean knee flexion of at least 25 degrees in which a knee bends by more than 40 degrees while the feet are more than 0.3 leg lengths apart along the facing direction, or the body or a foot goes as far forwards.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

@@ -44,7 +44,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
              most 1.2 s apart, a foot rising by less than 0.42 leg lengths and the body staying; three after each other at least.",
     source: "",
     movement: Movement::Repeated(FEWEST),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

@@ -28,7 +28,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Feet more than 0.2 leg lengths apart along the facing direction and less than 0.2 across it; a camera cannot tell 2.5 cm, so a tandem stand looks the same. The hold is the longest stretch in which both ankles stay within 0.06 leg lengths, no knee bends and the hips stay high, until a foot moves or the recording ends.",
     source: "Tiedemann, Lord, Sherrington 2010, J Gerontol A 65:896-903, doi 10.1093/gerona/glq067",
     movement: Movement::Held,
-    find: find,
+    find,
     measure: |motion, found| {
         of_hold(
             motion,

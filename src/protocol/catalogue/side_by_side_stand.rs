@@ -28,7 +28,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Feet less than 0.1 leg lengths apart along the facing direction and less than 0.2 across it. The hold is the longest stretch in which both ankles stay within 0.06 leg lengths, no knee bends and the hips stay high, until a foot moves or the recording ends.",
     source: "Guralnik et al. 1994, short physical performance battery",
     movement: Movement::Held,
-    find: find,
+    find,
     measure: |motion, found| {
         of_hold(
             motion,

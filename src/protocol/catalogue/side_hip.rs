@@ -30,7 +30,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of one hip's abduction of at least 12 degrees while both knees stay straight and the thigh does not come forwards.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

@@ -30,7 +30,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of one knee's flexion of at least 35 degrees while the feet are more than 0.7 leg lengths apart sideways and the other knee bends by less than 0.7 as much.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

@@ -31,7 +31,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of the mean knee flexion of at least 35 degrees in which both knees and thighs bend together, feet side by side, and the body's weight stays above the feet.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

@@ -30,7 +30,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Excursions of one knee's flexion of at least 30 degrees with the thigh coming forwards, in which the foot is raised by 0.12 to 0.42 leg lengths, put forwards and brought back, while the other foot stays.",
     source: "",
     movement: Movement::Repeated(1),
-    find: find,
+    find,
     measure: |_, found| of_repetitions(found),
 };
 

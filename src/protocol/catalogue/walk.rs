@@ -28,8 +28,8 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "A walk is a recording in which the pelvis comes more than 1.2 m from where it began; steps are found by the courses of pelvis and feet.",
     source: "",
     movement: Movement::Walked,
-    find: find,
-    measure: measure,
+    find,
+    measure,
 };
 
 fn find(motion: &Motion) -> Found {

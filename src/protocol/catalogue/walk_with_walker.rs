@@ -23,7 +23,7 @@ pub(super) static PROTOCOL: Protocol = Protocol {
     method: "Steps are found in the depth images by the assessment of gait; there are no repetitions of angles.",
     source: "",
     movement: Movement::Walked,
-    find: find,
+    find,
     measure: |_, _| Vec::new(),
 };
 
