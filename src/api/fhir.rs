@@ -1,5 +1,6 @@
 //! Read-only FHIR R4: measures, findings and reports as resources, by id and by search.
 
+use super::assessments::AssessmentPath;
 use super::auth::Clinician;
 use super::error::ApiError;
 use super::page::id_from_cursor;
@@ -7,11 +8,12 @@ use super::patients::PatientPath;
 use super::report::{ReportQuery, report_of};
 use super::request::{ApiPath, ApiQuery};
 use super::state::AppState;
+use crate::report::export::Samples;
 use crate::report::fhir::observation::observation;
 use crate::report::fhir::risk_assessment::{risk_assessment, risk_assessment_id};
-use crate::report::fhir::{self, Found, diagnostic_report::diagnostic_report};
+use crate::report::fhir::{self, Found, SeriesOrigin, diagnostic_report::diagnostic_report, series_bundle};
 use crate::report::{MeasureSource, PatientReport};
-use crate::storage::{AssessmentId, MeasureFilter, MeasureId, PageRequest, PatientId};
+use crate::storage::{AssessmentId, MeasureFilter, MeasureId, PageRequest, Parts, PatientId, SeriesQuery};
 use axum::extract::State;
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
@@ -20,6 +22,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use time::format_description::well_known::Rfc3339;
 use time::{Date, OffsetDateTime};
+use tokio::task::spawn_blocking;
 use utoipa::IntoParams;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -36,6 +39,7 @@ const DEFAULT_COUNT: u32 = 50;
 pub fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(read_fhir_bundle))
+        .routes(routes!(read_fhir_series))
         .routes(routes!(fhir_metadata))
         .routes(routes!(search_observations))
         .routes(routes!(read_observation))
@@ -99,6 +103,33 @@ async fn read_fhir_bundle(
     let report = report_of(&state.store, &caller, path.id, query.as_of).await?;
     let origins = state.store.origins_of_assessments(&caller.access, &assessments_of(&report)).await?;
     Ok(answer(&fhir::report_bundle(&report, &origins, BASE)))
+}
+
+/// Read the series of an assessment as a FHIR bundle
+///
+/// A collection with an Observation for each channel, as sampled data with one period; at most ten thousand samples of each, longer
+/// ones are read as CSV. Intervals and flags are not in it.
+#[utoipa::path(get, path = "/v1/assessments/{id}/fhir-bundle", tag = "fhir", operation_id = "read_fhir_series",
+    params(AssessmentPath),
+    responses((status = 200, description = "The bundle", content_type = "application/fhir+json", body = Value)))]
+async fn read_fhir_series(
+    State(state): State<AppState>,
+    Clinician(caller): Clinician,
+    ApiPath(path): ApiPath<AssessmentPath>,
+) -> Result<Response, ApiError> {
+    let assessment = state.store.assessment(&caller.access, path.id).await?;
+    let session = state.store.session(&caller.access, assessment.session_id).await?;
+    let query = SeriesQuery { parts: Parts { interval: false, flags: false }, ..SeriesQuery::default() };
+    let slice = state.store.series_of_assessment(&caller.access, path.id, &query).await?;
+    let origin = SeriesOrigin {
+        patient: assessment.patient_id.into(),
+        assessment: assessment.id.into(),
+        recorded_at: session.started_at,
+        created_at: assessment.created_at,
+    };
+    let samples = Samples { time_ns: slice.time_ns, series: slice.series };
+    let made = spawn_blocking(move || series_bundle(&samples, &origin, BASE).to_string()).await;
+    Ok(sent(made.map_err(ApiError::internal)?))
 }
 
 /// Read what the FHIR endpoints can do
@@ -224,7 +255,11 @@ async fn read_diagnostic_report(
 }
 
 fn answer(resource: &Value) -> Response {
-    ([(header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE))], resource.to_string()).into_response()
+    sent(resource.to_string())
+}
+
+fn sent(resource: String) -> Response {
+    ([(header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE))], resource).into_response()
 }
 
 /// The assessments that the measures of a report are from.

@@ -270,7 +270,9 @@ pub async fn report_of(
     let found = findings(&facts.known);
     let of_report = |m: &&MeasureRecord| m.side.is_none() && crate::report::measure::kind_of(&m.name).is_some();
     let shown: Vec<MeasureRecord> = facts.measures.iter().filter(of_report).cloned().collect();
-    let trends = trends(store, caller, patient, &shown, as_of, REPORT_POINTS).await?;
+    let mut trends = trends(store, caller, patient, &shown, as_of, REPORT_POINTS).await?;
+    // One value is no trend.
+    trends.retain(|trend| trend.points.len() > 1);
     Ok(PatientReport {
         patient: facts.summary(),
         as_of,

@@ -117,6 +117,12 @@ async fn an_assessment_is_exported_in_every_form_and_its_joints_can_be_replayed(
         let content = String::from_utf8(answer.body.to_vec()).unwrap();
         assert!(content.starts_with(start) && content.lines().count() > n, "{form}");
     }
+    let bundle = app.get(&format!("/v1/assessments/{id}/fhir-bundle")).send().await.expect(StatusCode::OK);
+    let entries = bundle["entry"].as_array().unwrap();
+    assert_eq!(entries.len(), assessment["channels"].as_array().unwrap().len());
+    let data = text(&entries[0]["resource"]["valueSampledData"]["data"]);
+    assert_eq!(data.split(' ').count(), n);
+    validate(&bundle);
     app.get(&format!("/v1/assessments/{id}/export?form=c3d")).send().await.refused(400, "invalid_request");
     let elsewhere = app.stranger().await;
     app.get(&format!("/v1/assessments/{id}/joints")).key(&elsewhere).send().await.refused(404, "not_found");

@@ -10,8 +10,8 @@ use super::patients::yes_no;
 use super::words;
 use crate::api::AppState;
 use crate::api::report::report_of;
-use crate::fall_risk::Status;
-use crate::report::{PatientReport, StatusCounts};
+use crate::fall_risk::{Status, change_rule_of, rules_of_measure};
+use crate::report::{MeasureRecord, PatientReport, StatusCounts};
 use crate::storage::PatientId;
 use askama::Template;
 use axum::extract::{Query, State};
@@ -47,7 +47,10 @@ struct ReportPage {
     groups: Vec<Group>,
     open: Vec<OpenView>,
     trends: Vec<TrendView>,
+    /// Measures that a rule or a limit of change looks at.
     measures: Vec<MeasureRow>,
+    /// All others.
+    further: Vec<MeasureRow>,
     adherence: Option<AdherenceView>,
     sessions: Vec<SessionView>,
     caution: &'static str,
@@ -99,6 +102,7 @@ impl ReportPage {
             ("Walking aid", yes_no(patient.uses_walking_aid).to_owned()),
         ];
         let positive = report.findings.iter().filter(|finding| finding.status == Some(Status::Positive));
+        let (looked_at, further): (Vec<&MeasureRecord>, Vec<_>) = report.measures.iter().partition(|m| is_looked_at(m));
         let as_of_day = if is_earlier { report.as_of.date().to_string() } else { String::new() };
         Self {
             frame,
@@ -114,13 +118,20 @@ impl ReportPage {
             groups: groups(&report.findings),
             open: open_questions(&report.findings, &report.needed),
             trends: report.trends.iter().map(TrendView::of).collect(),
-            measures: report.measures.iter().map(MeasureRow::of).collect(),
+            measures: looked_at.into_iter().map(MeasureRow::of).collect(),
+            further: further.into_iter().map(MeasureRow::of).collect(),
             adherence: report.adherence.as_ref().map(AdherenceView::of),
             sessions: report.recent_sessions.iter().map(SessionView::of).collect(),
             caution: report.caution,
             version: report.software_version,
         }
     }
+}
+
+/// Whether a rule or a limit of change looks at a measure.
+fn is_looked_at(measure: &MeasureRecord) -> bool {
+    let name = &measure.name;
+    measure.side.is_none() && (!rules_of_measure(name).is_empty() || change_rule_of(name).is_some())
 }
 
 fn population(matches: Option<bool>) -> &'static str {

@@ -10,10 +10,12 @@ pub mod diagnostic_report;
 pub mod observation;
 pub mod provenance;
 pub mod risk_assessment;
+pub mod series;
 
 pub use bundle::{Found, report_bundle, searchset};
 pub use capability::capability_statement;
 pub use provenance::AssessmentOrigin;
+pub use series::{SeriesOrigin, series_bundle};
 
 use serde_json::{Value, json};
 use time::OffsetDateTime;
