@@ -28,6 +28,8 @@ use uuid::Uuid;
 /// Latest values that a trend in the report goes back over, and most that can be asked for.
 const REPORT_POINTS: u32 = 30;
 const DEFAULT_POINTS: u32 = 100;
+/// Protocol whose measures are of a walking aid's user.
+const WALK_WITH_AID: &str = "walk_with_walker";
 /// Latest sessions that the report shows.
 const REPORT_SESSIONS: u32 = 10;
 
@@ -337,13 +339,15 @@ impl Facts {
         // Where a measure has several definitions the last one counts for rules: footprints, as walkways measure them.
         let whole_body = records.iter().enumerate().filter(|(_, record)| record.side.is_none());
         let taken = whole_body.filter(|(_, record)| measures.take(&record.name, record.measured()));
-        let used = taken.map(|(i, _)| i).collect();
+        let used: Vec<usize> = taken.map(|(i, _)| i).collect();
+        // Whoever walked behind a walker uses a walking aid, whatever stands in the patient's data.
+        let walked_with_aid = used.iter().any(|i| records[*i].protocol.as_deref() == Some(WALK_WITH_AID));
         let answers = answered.as_ref().map(|entry| entry.content).unwrap_or_default();
         let age_years = patient.birth_year.map(|year| by.year() - i32::from(year));
         let person = Person {
             age_years: age_years.map(f64::from),
             sex: patient.sex.and_then(sex_of_norms),
-            uses_walking_aid: patient.uses_walking_aid,
+            uses_walking_aid: if walked_with_aid { Some(true) } else { patient.uses_walking_aid },
             lives_in_community: answers.lives_in_community,
         };
         let known = Known { person, answers, measures };
@@ -358,7 +362,7 @@ impl Facts {
             age_years: self.age_years,
             sex: self.known.person.sex,
             height_m: self.patient.height_m,
-            uses_walking_aid: self.patient.uses_walking_aid,
+            uses_walking_aid: self.known.person.uses_walking_aid,
             matches_population: self.known.person.matches_population(),
         }
     }

@@ -4,7 +4,10 @@ use crate::support::fhir::validate;
 use crate::support::{TestApp, text};
 use axum::http::StatusCode;
 use serde_json::{Value, json};
+use std::io::Cursor;
 use surefoot::recording::encode;
+use surefoot::synthetic::walker::trousers::trousers;
+use surefoot::synthetic::walker::{Course, WalkerSettings, WalkerSimulation};
 use surefoot::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 
 struct Exercised {
@@ -138,4 +141,41 @@ async fn a_protocol_says_which_rules_look_at_its_measures() {
     assert!(rules_of("five_times_sit_to_stand").await.contains(&"sts5".to_owned()));
     assert!(rules_of("walk").await.contains(&"speed_slow_ss".to_owned()));
     assert_eq!(rules_of("back_knee").await, Vec::<String>::new());
+}
+
+/// Seconds of a brisk walk behind a walker, as depth images.
+fn walk_with_walker() -> Vec<u8> {
+    let settings = WalkerSettings::of_seed(Course::Straight, 2).with_speed(0.8);
+    let settings = WalkerSettings { duration_s: 6.0, rate_hz: 20.0, ..settings };
+    let simulation = WalkerSimulation::new(&settings, trousers()).unwrap();
+    simulation.write(Cursor::new(Vec::new()), |_| {}).unwrap().into_inner()
+}
+
+#[tokio::test]
+async fn a_walk_behind_a_walker_is_measured_by_its_footfalls_and_makes_its_person_a_user_of_an_aid() {
+    let app = TestApp::new().await;
+    let new = json!({"pseudonym": "P-9", "birth_year": 1948, "uses_walking_aid": false});
+    let patient = text(&app.post("/v1/patients").json(&new).send().await.expect(StatusCode::CREATED)["id"]).to_owned();
+    let session =
+        app.post("/v1/sessions").json(&json!({"patient_id": patient})).send().await.expect(StatusCode::CREATED);
+    let upload = app.post(&format!("/v1/sessions/{}/recordings", text(&session["id"])));
+    let uploaded = upload.body("application/mcap", walk_with_walker()).send().await.expect(StatusCode::ACCEPTED);
+    app.run_pending_jobs().await;
+    let job = app.get(&format!("/v1/jobs/{}", text(&uploaded["job"]["id"]))).send().await.expect(StatusCode::OK);
+    let path = format!("/v1/assessments/{}", text(&job["assessment_id"]));
+    let assessment = app.get(&path).send().await.expect(StatusCode::OK);
+    let performance = &assessment["performance"];
+    assert_eq!((&performance["protocol"], &performance["status"]), (&json!("walk_with_walker"), &json!("measured")));
+    let footfalls = &performance["footfalls"];
+    assert!(footfalls["contacts"].as_array().unwrap().len() >= 6, "{footfalls:#}");
+    assert_eq!(footfalls["exclusions"][0]["reason"], "first_or_last");
+    let joints = app.get(&format!("{path}/joints")).send().await.expect(StatusCode::OK);
+    assert_eq!(joints["joints"].as_array().unwrap().len(), 6);
+
+    let risk = app.get(&format!("/v1/patients/{patient}/fall-risk")).send().await.expect(StatusCode::OK);
+    let used = risk["inputs"]["measures"].as_array().unwrap();
+    assert!(used.iter().any(|measure| measure["name"] == "usual_speed_mps"), "{used:#?}");
+    for finding in risk["findings"].as_array().unwrap() {
+        assert_eq!((&finding["population_match"], &finding["probability"]), (&json!(false), &Value::Null));
+    }
 }
