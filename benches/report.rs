@@ -91,28 +91,28 @@ async fn fill(config: &Config) -> Result<(), sqlx::Error> {
          SELECT i, i % 100 AS patient, i / 100 AS session FROM n",
         "CREATE TEMP TABLE whom AS SELECT organisation_id, id AS client_id FROM clients LIMIT 1",
         "INSERT INTO patients (id, organisation_id, pseudonym, birth_year, sex, uses_walking_aid, created_at)
-         SELECT unhex(printf('%012x', patient)) || randomblob(10), organisation_id, 'P-' || patient, 1948, 'female', 0, 0
+         SELECT CAST(unhex(printf('%012x', patient)) || randomblob(10) AS BLOB), organisation_id, 'P-' || patient, 1948, 'female', 0, 0
          FROM numbers, whom WHERE session = 0",
         "CREATE TEMP TABLE people AS SELECT id, CAST(substr(pseudonym, 3) AS INTEGER) AS patient FROM patients",
         "INSERT INTO sessions (id, organisation_id, patient_id, created_by, started_at, protocol, created_at)
-         SELECT unhex(printf('%012x', i)) || randomblob(10), organisation_id, people.id, client_id,
+         SELECT CAST(unhex(printf('%012x', i)) || randomblob(10) AS BLOB), organisation_id, people.id, client_id,
                 session * 43200000, 'walk', session * 43200000
          FROM numbers JOIN people USING (patient), whom ORDER BY i",
         "INSERT INTO recordings (id, organisation_id, session_id, created_by, size_bytes, sha256, blob_key, inspection,
                                  created_at)
-         SELECT substr(id, 1, 6) || randomblob(10), organisation_id, id, created_by, 1, printf('%064d', 0), '', '{}',
+         SELECT CAST(substr(id, 1, 6) || randomblob(10) AS BLOB), organisation_id, id, created_by, 1, printf('%064d', 0), '', '{}',
                 created_at FROM sessions ORDER BY id",
         "INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, settings, queued_at)
-         SELECT substr(id, 1, 6) || randomblob(10), organisation_id, id, 'done', 3, '{}', created_at
+         SELECT CAST(substr(id, 1, 6) || randomblob(10) AS BLOB), organisation_id, id, 'done', 3, '{}', created_at
          FROM recordings ORDER BY id",
         "INSERT INTO assessments (id, organisation_id, recording_id, job_id, pipeline, method, channels, summary, quality,
                                   provenance, n_samples, created_at, performance)
-         SELECT substr(j.id, 1, 6) || randomblob(10), j.organisation_id, j.recording_id, j.id, 'joint_angles', 'iekf', '[]',
+         SELECT CAST(substr(j.id, 1, 6) || randomblob(10) AS BLOB), j.organisation_id, j.recording_id, j.id, 'joint_angles', 'iekf', '[]',
                 '[]', '{\"coverage\": 0.98, \"warnings\": []}', ?2, 0, j.queued_at, ?1
          FROM jobs j ORDER BY j.id",
         "INSERT INTO measures (id, organisation_id, patient_id, name, value, standard_error, n_observations, protocol,
                                assessment_id, recording_id, session_id, measured_at, created_at)
-         SELECT substr(a.id, 1, 6) || unhex(printf('%04x', one.key)) || randomblob(8), a.organisation_id, s.patient_id,
+         SELECT CAST(substr(a.id, 1, 6) || unhex(printf('%04x', one.key)) || randomblob(8) AS BLOB), a.organisation_id, s.patient_id,
                 one.value, 1.0 + abs(random() % 1000) / 5000.0, 0.02, 20, 'walk', a.id, r.id, s.id, s.started_at, a.created_at
          FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id,
               json_each(?1) one ORDER BY a.id",

@@ -39,7 +39,7 @@ CREATE INDEX measures_by_name ON measures (patient_id, name, side, definition, m
 -- What had been entered before: ids after those of the measurements, so that their order stays.
 INSERT INTO measures (id, organisation_id, patient_id, name, value, standard_error, n_observations, error_sd,
                       measurement_id, measured_at, created_at)
-SELECT substr(m.id, 1, 8) || randomblob(8), m.organisation_id, m.patient_id, one.key, one.value ->> '$.value',
+SELECT CAST(substr(m.id, 1, 8) || randomblob(8) AS BLOB), m.organisation_id, m.patient_id, one.key, one.value ->> '$.value',
        one.value ->> '$.standard_error', one.value ->> '$.n_observations', one.value ->> '$.error_sd',
        m.id, m.measured_at, m.created_at
 FROM measurements m, json_each(m.measures) one;

@@ -3,6 +3,7 @@
 use super::*;
 use crate::recording::Header;
 use crate::recording::decode::{Format, Inspection};
+use sqlx::{ConnectOptions, Connection};
 use tempfile::TempDir;
 use time::macros::datetime;
 
@@ -267,4 +268,31 @@ async fn a_device_sees_its_own_sessions_and_what_hangs_on_them_only() {
     assert_eq!(list(&clinic.admin, RecordingFilter { session_id: Some(own), ..all }).await, [recording.id]);
     let of_patient = RecordingFilter { patient_id: Some(clinic.patient), ..all };
     assert_eq!(list(&clinic.admin, of_patient).await, [recording.id, theirs.id]);
+}
+
+#[tokio::test]
+async fn results_of_tests_from_before_there_were_measures_become_measures() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = SqliteConnectOptions::new().filename(folder.path().join(DATABASE_FILE)).create_if_missing(true);
+    let mut connection = options.connect().await.unwrap();
+    let before = MIGRATIONS.iter().filter(|migration| migration.version < 5).cloned().collect();
+    sqlx::migrate::Migrator::with_migrations(before).run(&mut connection).await.unwrap();
+    for statement in [
+        "INSERT INTO organisations VALUES (zeroblob(16), 'o', 0)",
+        "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at)
+         VALUES (zeroblob(16), zeroblob(16), 'admin', 'a', zeroblob(32), 0)",
+        "INSERT INTO patients (id, organisation_id, pseudonym, created_at) VALUES (zeroblob(16), zeroblob(16), 'p', 0)",
+        r#"INSERT INTO measurements VALUES (randomblob(16), zeroblob(16), zeroblob(16), zeroblob(16), 5,
+           '{"usual_speed_mps": {"value": 1.5, "standard_error": 0.1}, "timed_up_and_go_s": {"value": 9}}', 7)"#,
+    ] {
+        sqlx::query(statement).execute(&mut connection).await.unwrap();
+    }
+    connection.close().await.unwrap();
+
+    let store = Store::open(folder.path()).await.unwrap();
+    let nobody = uuid::Uuid::nil();
+    let access = Access { organisation: OrganisationId(nobody), client: ClientId(nobody), own_sessions_only: false };
+    let found = store.newest_measures(&access, PatientId(nobody), datetime!(2026-01-01 0:00 UTC)).await.unwrap();
+    let values: Vec<_> = found.iter().map(|m| (m.name.as_str(), m.value, m.standard_error)).collect();
+    assert_eq!(values, [("timed_up_and_go_s", 9.0, None), ("usual_speed_mps", 1.5, Some(0.1))]);
 }
