@@ -44,7 +44,8 @@ impl Store {
     ) -> Result<Vec<RecentSession>, StorageError> {
         let rows = sqlx::query(
             "SELECT s.id, s.started_at, s.protocol, r.id AS recording_id,
-                    coalesce(r.inspection ->> '$.header.protocol', s.protocol) AS recording_protocol,
+                    coalesce(a.performance ->> '$.protocol', r.inspection ->> '$.header.protocol', s.protocol)
+                        AS recording_protocol,
                     j.state, CASE WHEN j.state = 'failed' THEN j.error ->> '$.sentence' END AS error,
                     a.id AS assessment_id, a.pipeline, a.performance,
                     a.quality ->> '$.coverage' AS coverage, a.quality -> '$.warnings' AS warnings
@@ -89,12 +90,13 @@ impl Store {
         [from, by]: [OffsetDateTime; 2],
     ) -> Result<Vec<TrainedSession>, StorageError> {
         let rows = sqlx::query(
-            "SELECT s.id, s.started_at, coalesce(r.inspection ->> '$.header.protocol', s.protocol) AS protocol,
-                    (SELECT CASE WHEN a.performance ->> '$.status' = 'measured'
-                                 THEN json_array_length(a.performance, '$.repetitions') END
-                     FROM assessments a WHERE a.recording_id = r.id AND a.created_at <= ?4
-                     ORDER BY a.id DESC LIMIT 1) AS repetitions
+            "SELECT s.id, s.started_at,
+                    coalesce(a.performance ->> '$.protocol', r.inspection ->> '$.header.protocol', s.protocol) AS protocol,
+                    CASE WHEN a.performance ->> '$.status' = 'measured'
+                         THEN json_array_length(a.performance, '$.repetitions') END AS repetitions
              FROM sessions s JOIN recordings r ON r.session_id = s.id AND r.created_at <= ?4
+                  LEFT JOIN assessments a ON a.id = (SELECT max(id) FROM assessments
+                                                     WHERE recording_id = r.id AND created_at <= ?4)
              WHERE s.organisation_id = ?1 AND s.patient_id = ?2 AND s.started_at BETWEEN ?3 AND ?4 AND s.created_at <= ?4
              ORDER BY s.started_at, s.id, r.id",
         )

@@ -163,19 +163,20 @@ impl Store {
         Ok(Page::from_rows(recordings, page, |recording| recording.id))
     }
 
-    /// The exercise or test that was done in a recording, as its header says it or else its session; for the worker.
+    /// What was done in a recording, as its header says it and as its session does; for the worker.
     ///
     /// # Errors
     /// `NotFound` when there is no such recording.
-    pub async fn declared_protocol(&self, id: RecordingId) -> Result<Option<String>, StorageError> {
-        let found = sqlx::query_scalar(
-            "SELECT coalesce(r.inspection ->> '$.header.protocol', s.protocol)
+    pub async fn declared_protocols(&self, id: RecordingId) -> Result<[Option<String>; 2], StorageError> {
+        let row = sqlx::query(
+            "SELECT r.inspection ->> '$.header.protocol' AS of_header, s.protocol AS of_session
              FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = ?1",
         )
         .bind(id)
         .fetch_optional(self.reader())
-        .await?;
-        found.ok_or(StorageError::not_found("recording"))
+        .await?
+        .ok_or(StorageError::not_found("recording"))?;
+        Ok([row.try_get("of_header")?, row.try_get("of_session")?])
     }
 
     /// The recording that a job is about, for the worker, which serves every organisation.

@@ -170,7 +170,11 @@ impl Worker {
 
     async fn assessment(&self, job: &Job, inputs: Inputs, monitor: &Monitor) -> Result<Assessment, AttemptError> {
         let (reader, recording) = self.open(job.recording_id).await?;
-        let declared = self.queue.store().declared_protocol(job.recording_id).await?;
+        let declared = self.queue.store().declared_protocols(job.recording_id).await?;
+        // A name of the catalogue counts before one that only the recording's maker knows.
+        let is_known = |name: &&String| protocol::find(name).is_some();
+        let named = || declared.iter().flatten();
+        let declared = named().find(is_known).or_else(|| named().next()).cloned();
         let (assess, settings, view) = (self.assess.clone(), job.settings.clone(), monitor.clone());
         let sha256 = recording.blob.sha256.clone();
         let computing = spawn_blocking(move || {
