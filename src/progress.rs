@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+use std::time::Instant;
 use utoipa::ToSchema;
 
 /// One step of an assessment, in the order in which they run.
@@ -29,6 +30,19 @@ pub enum Step {
 }
 
 impl Step {
+    /// The word in the database, at the API and in metrics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Step::Waiting => "waiting",
+            Step::Decoding => "decoding",
+            Step::Calibrating => "calibrating",
+            Step::Estimating => "estimating",
+            Step::Smoothing => "smoothing",
+            Step::Summarizing => "summarizing",
+            Step::Saving => "saving",
+        }
+    }
+
     const ALL: [Step; 7] = [
         Step::Waiting,
         Step::Decoding,
@@ -62,17 +76,47 @@ pub struct Monitor {
     state: Arc<State>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct State {
+    made: Instant,
     step: AtomicU8,
+    /// When the step that runs began, nanoseconds after `made`.
+    begun_ns: AtomicU64,
+    /// Time that each step took, nanoseconds.
+    took_ns: [AtomicU64; Step::ALL.len()],
     done: AtomicU64,
     total: AtomicU64,
     cancelled: AtomicBool,
 }
 
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            made: Instant::now(),
+            step: AtomicU8::default(),
+            begun_ns: AtomicU64::default(),
+            took_ns: Default::default(),
+            done: AtomicU64::default(),
+            total: AtomicU64::default(),
+            cancelled: AtomicBool::default(),
+        }
+    }
+}
+
+impl State {
+    fn elapsed_ns(&self) -> u64 {
+        u64::try_from(self.made.elapsed().as_nanos()).unwrap_or(u64::MAX)
+    }
+}
+
 impl Monitor {
     /// Enters a step of `total` units; its count starts at zero.
     pub fn begin(&self, step: Step, total: u64) -> Result<(), Cancelled> {
+        let now = self.state.elapsed_ns();
+        let begun = self.state.begun_ns.swap(now, Ordering::Relaxed);
+        if let Some(took) = self.state.took_ns.get(usize::from(self.state.step.load(Ordering::Relaxed))) {
+            took.fetch_add(now.saturating_sub(begun), Ordering::Relaxed);
+        }
         self.state.done.store(0, Ordering::Relaxed);
         self.state.total.store(total, Ordering::Relaxed);
         self.state.step.store(step as u8, Ordering::Release);
@@ -93,6 +137,12 @@ impl Monitor {
     /// Asks the work to stop at its next report.
     pub fn cancel(&self) {
         self.state.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Time that each step took which is over, seconds; steps that never ran are left out.
+    pub fn durations(&self) -> impl Iterator<Item = (Step, f64)> + '_ {
+        let took = self.state.took_ns.iter().map(|took| took.load(Ordering::Relaxed));
+        Step::ALL.into_iter().zip(took).filter(|(_, took)| *took > 0).map(|(step, took)| (step, took as f64 * 1e-9))
     }
 
     /// How far the work is.

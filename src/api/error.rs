@@ -3,6 +3,7 @@
 //! Every answer of 400 and above is `application/problem+json` with a stable `code`, a sentence for a person, and the
 //! paths of the fields concerned. What went wrong inside is logged and never sent.
 
+use crate::queue::Crowded;
 use crate::recording::DecodeError;
 use crate::storage::StorageError;
 use axum::http::{HeaderValue, StatusCode, header};
@@ -31,6 +32,9 @@ pub struct Problem {
     /// The fields concerned; absent when the problem lies in no field.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub errors: Vec<FieldError>,
+    /// Seconds after which it is worth trying again; also in the header `Retry-After`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub retry_after_s: Option<u64>,
     /// Names this one occurrence; quote it when asking for help. It is also in the header `x-request-id`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instance: Option<String>,
@@ -92,6 +96,10 @@ pub enum ApiError {
     IdempotencyKeyReused,
     /// A part of the service is not ready.
     Unavailable(&'static str),
+    /// Too many jobs wait for one more.
+    Crowded(Crowded),
+    /// The disk is full.
+    OutOfSpace,
     /// Our fault: logged, not told.
     Internal(anyhow::Error),
 }
@@ -158,6 +166,12 @@ impl ApiError {
                 Problem::new(S::UNPROCESSABLE_ENTITY, "idempotency_key_reused", detail)
             }
             Self::Unavailable(detail) => Problem::new(S::SERVICE_UNAVAILABLE, "unavailable", *detail),
+            Self::Crowded(crowded) => Problem::of_crowd(crowded),
+            Self::OutOfSpace => {
+                let detail = "The service has no room left for this. Nothing was stored and nothing that was stored is \
+                              lost; keep the recording and send it again later.";
+                Problem::new(S::INSUFFICIENT_STORAGE, "out_of_space", detail)
+            }
             Self::Internal(_) => Problem::of_status(S::INTERNAL_SERVER_ERROR),
         }
         .with_errors(self.field_errors())
@@ -179,6 +193,10 @@ impl From<StorageError> for ApiError {
         match error {
             StorageError::NotFound { what } => Self::NotFound(what),
             StorageError::Conflict { code, sentence } => Self::Conflict(code, sentence),
+            full if full.is_out_of_space() => {
+                tracing::error!(error = format!("{full:#}"), "the disk is full");
+                Self::OutOfSpace
+            }
             other => Self::internal(other),
         }
     }
@@ -202,6 +220,7 @@ impl Problem {
             code: code.to_owned(),
             detail: detail.into(),
             errors: Vec::new(),
+            retry_after_s: None,
             instance: None,
         }
     }
@@ -212,6 +231,20 @@ impl Problem {
             None => error.sentence.clone(),
         };
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, error.code, detail)
+    }
+
+    fn of_crowd(crowded: &Crowded) -> Self {
+        let Crowded { is_own, waiting, retry_after } = crowded;
+        let (status, code, whose) = match is_own {
+            true => (StatusCode::TOO_MANY_REQUESTS, "too_many_waiting_jobs", "of your organisation "),
+            false => (StatusCode::SERVICE_UNAVAILABLE, "queue_full", ""),
+        };
+        let seconds = retry_after.as_secs();
+        let detail = format!(
+            "{waiting} recordings {whose}already wait to be assessed, and no more may. Nothing was stored; keep the \
+             recording and send it again in {seconds} s."
+        );
+        Self { retry_after_s: Some(seconds), ..Self::new(status, code, detail) }
     }
 
     /// The problem of an answer that carries nothing but a status, such as the router's own 404 and 405.
@@ -247,6 +280,7 @@ fn title(status: StatusCode, code: &str) -> &'static str {
         "too_large" => "The body is too large",
         "unknown_address" => "Unknown address",
         "not_found" => "Not found",
+        "out_of_space" => "No room left",
         _ if status == StatusCode::UNPROCESSABLE_ENTITY => "The recording was refused",
         _ => status.canonical_reason().unwrap_or("Refused"),
     }
@@ -260,6 +294,9 @@ impl IntoResponse for Problem {
         if status == StatusCode::UNAUTHORIZED {
             let challenge = HeaderValue::from_static("Bearer realm=\"surefoot\"");
             response.headers_mut().insert(header::WWW_AUTHENTICATE, challenge);
+        }
+        if let Some(seconds) = self.retry_after_s {
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
         // `observe` adds the instance, which is not known here.
         response.extensions_mut().insert(self);

@@ -56,6 +56,8 @@ pub struct JobResponse {
     pub max_attempts: u32,
     /// Whether somebody asked to stop it.
     pub cancel_requested: bool,
+    /// How many waiting jobs of this service have their turn before it; null unless it waits and is read by itself.
+    pub n_ahead: Option<u64>,
     /// How far the latest attempt is.
     pub progress: Progress,
     /// What is computed.
@@ -87,6 +89,7 @@ impl From<Job> for JobResponse {
             attempt: job.attempt,
             max_attempts: job.max_attempts,
             cancel_requested: job.cancel_requested,
+            n_ahead: job.n_ahead,
             progress: job.progress,
             settings: job.settings,
             error: job.error,

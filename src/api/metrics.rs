@@ -20,6 +20,8 @@ pub const UPLOAD_BYTES: &str = "surefoot_upload_bytes_total";
 pub const JOB_WAIT: &str = "surefoot_job_wait_seconds";
 /// Jobs by state.
 pub const JOBS: &str = "surefoot_jobs";
+/// Expected computation of the jobs that wait, seconds: what to scale workers on.
+pub const EXPECTED: &str = "surefoot_queue_expected_seconds";
 
 /// Upper bounds of the buckets of every time, seconds: from a small read to a long assessment.
 const TIME_BUCKETS: [f64; 14] =
@@ -44,6 +46,7 @@ pub fn recorder() -> Result<PrometheusHandle, BuildError> {
     metrics::describe_histogram!(JOB_WAIT, metrics::Unit::Seconds, "Time from the request for a job to its beginning");
     metrics::describe_counter!(UPLOAD_BYTES, metrics::Unit::Bytes, "Bytes of recordings that arrived");
     metrics::describe_gauge!(JOBS, "Jobs by state");
+    metrics::describe_gauge!(EXPECTED, metrics::Unit::Seconds, "Expected computation of the jobs that wait");
     *installed = Some(handle.clone());
     Ok(handle)
 }
@@ -62,6 +65,7 @@ async fn read_metrics(State(state): State<AppState>) -> Result<Response, ApiErro
     for (job_state, count) in state.queue.counts().await? {
         metrics::gauge!(JOBS, "state" => job_state.name()).set(count as f64);
     }
+    metrics::gauge!(EXPECTED).set(state.queue.expected_wait().await?.as_secs_f64());
     let content_type = (header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8");
     Ok(([content_type], state.metrics.render()).into_response())
 }

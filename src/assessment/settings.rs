@@ -161,6 +161,16 @@ impl Settings {
         }
         Settings::default()
     }
+
+    /// Name of the pipeline that they are for.
+    pub fn pipeline(&self) -> &'static str {
+        match self {
+            Settings::JointAngles(_) => "joint_angles",
+            Settings::SkeletonFusion(_) => "skeleton_fusion",
+            Settings::LegPose(_) => "leg_pose",
+            Settings::NoiseModel(_) => "noise_model",
+        }
+    }
 }
 
 /// Settings of the joint-angle pipeline; every field has a default.

@@ -5,7 +5,7 @@ use crate::assessment::JointAngleSettings;
 use crate::config::Config;
 use crate::recording::{Recording, encode};
 use crate::signal::interpolation::interpolate;
-use crate::storage::{Role, Store};
+use crate::storage::Role;
 use crate::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -102,9 +102,7 @@ pub async fn run(args: &Args) -> anyhow::Result<()> {
 
 /// A clinician's key of the demo's own; a data directory may be used again.
 async fn demo_key(config: &Config) -> anyhow::Result<String> {
-    let store = Store::open(&config.data_dir)
-        .await
-        .with_context(|| format!("cannot open the data directory {}", config.data_dir.display()))?;
+    let store = serve::open_store(&config).await?;
     store.ensure_first_admin().await?;
     let organisations = store.organisations().await?;
     let organisation = organisations.first().context("the data directory has no organisation")?;

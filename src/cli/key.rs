@@ -2,7 +2,7 @@
 
 use super::serve;
 use crate::storage::{Client, ClientId, OrganisationId, Role, StorageError, Store};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use std::path::PathBuf;
 use uuid::Uuid;
 
@@ -74,9 +74,7 @@ pub async fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(data_dir) = &args.data_dir {
         config.data_dir.clone_from(data_dir);
     }
-    let store = Store::open(&config.data_dir)
-        .await
-        .with_context(|| format!("cannot open the data directory {}", config.data_dir.display()))?;
+    let store = serve::open_store(&config).await?;
     let result = match &args.action {
         Action::Create { role, label, organisation } => {
             create(&store, (*role).into(), label, organisation.as_deref(), args.json).await

@@ -16,6 +16,7 @@ pub mod serve;
 pub mod simulate;
 pub mod simulate_walker;
 pub mod train;
+pub mod worker;
 
 use clap::{Parser, Subcommand};
 
@@ -33,6 +34,7 @@ struct Cli {
 enum Command {
     Demo(demo::Args),
     Serve(serve::Args),
+    Worker(worker::Args),
     Assess(assess::Args),
     Import(Import),
     Simulate(Simulate),
@@ -75,6 +77,7 @@ pub fn run() -> anyhow::Result<()> {
         Command::Demo(args) => runtime.block_on(demo::run(&args)),
         Command::Assess(args) => assess::run(&args),
         Command::Serve(args) => runtime.block_on(serve::run(&args)),
+        Command::Worker(args) => runtime.block_on(worker::run(&args)),
         Command::Import(Import { kind: Some(import_depth::Kind::Depth(args)), .. }) => import_depth::run(&args),
         Command::Import(Import { dataset: Some(args), .. }) => import::run(&args),
         Command::Simulate(Simulate { kind: Some(simulate_walker::Kind::Walker(args)), .. }) => {

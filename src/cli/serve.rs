@@ -3,14 +3,15 @@
 use crate::api::AppState;
 use crate::config::Config;
 use crate::pages;
-use crate::queue::{Queue, QueueSettings};
+use crate::queue::{Messenger, Queue, QueueSettings};
 use crate::recording::decode::Limits;
-use crate::storage::Store;
+use crate::storage::{Places, Store, SystemClock};
 use crate::worker;
 use anyhow::Context;
 use std::collections::HashMap;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::task::{JoinHandle, JoinSet};
@@ -141,20 +142,18 @@ impl Running {
 /// # Errors
 /// When the data directory cannot be used or the address is taken.
 pub async fn start(config: Config) -> anyhow::Result<Running> {
-    let store = Store::open(&config.data_dir)
-        .await
-        .with_context(|| format!("cannot open the data directory {}", config.data_dir.display()))?;
+    let store = open_store(&config).await?;
     let admin_key = store.ensure_first_admin().await?.map(|key| key.reveal().to_owned());
-    let queue = Queue::new(store.clone(), QueueSettings::from(&config));
+    let stop = CancellationToken::new();
+    let queue = open_queue(&store, &config, &stop).await?;
     let listener =
         TcpListener::bind(config.listen).await.with_context(|| format!("cannot listen on {}", config.listen))?;
     let addr = listener.local_addr()?;
     let limits = recording_limits(&config);
-    let n_workers = config.workers;
-    let state = AppState::new(queue.clone(), config, limits.clone())?;
-    let stop = state.shutdown.clone();
+    let (n_workers, has_canary) = (config.workers, config.canary);
+    let state = AppState { shutdown: stop.clone(), ..AppState::new(queue.clone(), config, limits.clone())? };
 
-    let mut workers = worker::spawn(&queue, n_workers, &limits, &stop);
+    let mut workers = worker::spawn(&queue, n_workers, &limits, has_canary, &stop);
     let metrics = state.metrics.clone();
     let upkeep = stop.clone();
     workers.spawn(async move {
@@ -167,6 +166,30 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
     let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let server = tokio::spawn(serving.into_future());
     Ok(Running { addr, admin_key, store, stop, server, workers })
+}
+
+/// Opens the store that the configuration names.
+///
+/// # Errors
+/// When a place cannot be reached or used.
+pub async fn open_store(config: &Config) -> anyhow::Result<Store> {
+    let opened = Store::open_at(&Places::from(config), Arc::new(SystemClock)).await;
+    opened.with_context(|| match &config.database_url {
+        // Without the address: it may hold a password.
+        Some(_) => "cannot open the database or the blobs".to_owned(),
+        None => format!("cannot open the data directory {}", config.data_dir.display()),
+    })
+}
+
+/// The queue of a store, with the messenger that the configuration names.
+///
+/// # Errors
+/// When the messenger cannot be used.
+pub async fn open_queue(store: &Store, config: &Config, stop: &CancellationToken) -> anyhow::Result<Queue> {
+    let queue = Queue::new(store.clone(), QueueSettings::from(config));
+    let Some(url) = &config.nats_url else { return Ok(queue) };
+    let messenger = Messenger::connect(url, &config.nats_subject).await.map_err(anyhow::Error::msg)?;
+    Ok(queue.with_messenger(messenger, stop))
 }
 
 /// How much of a recording is accepted.
@@ -211,7 +234,7 @@ fn announce(running: &Running, json: bool) {
 }
 
 /// Waits for the signal to end.
-async fn ended() -> anyhow::Result<()> {
+pub(super) async fn ended() -> anyhow::Result<()> {
     #[cfg(unix)]
     {
         use tokio::signal::unix::{SignalKind, signal};

@@ -2,10 +2,10 @@
 
 use super::job::job_from_row;
 use super::{Job, JobError, Queue, WORKER_LOST};
-use crate::progress::{Progress, Step};
+use crate::progress::Progress;
 use crate::storage::clock::ms_from_time;
+use crate::storage::database::{Transaction, dialects, query};
 use crate::storage::{JobId, StorageError, row};
-use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
 
 /// What a worker learns when it renews its lease.
@@ -20,25 +20,37 @@ pub enum Renewal {
 }
 
 impl Queue {
-    /// Takes the job that has waited longest, counts the attempt and starts its lease; `None` when none is due.
+    /// Takes the due job whose turn it is, counts the attempt and starts its lease; `None` when none is due.
     ///
     /// # Errors
     /// When the database fails.
     pub async fn claim(&self, worker: &str) -> Result<Option<Job>, StorageError> {
         let now = self.store.now();
         let mut transaction = self.store.begin().await?;
-        let ended = end_lost_jobs(&mut transaction, now).await?;
+        let ended = end_lost_jobs(&mut transaction, now, now + self.settings.furthest_due()).await?;
         // One statement: between the choice and the change there is no moment for another worker.
-        let claimed: Option<JobId> = sqlx::query_scalar(
-            "UPDATE jobs SET state = 'running', attempt = attempt + 1, worker = ?1, due_at = ?2, started_at = ?3,
-                             progress_step = 'waiting', progress_done = 0, progress_total = 0
-             WHERE id = (SELECT id FROM jobs WHERE due_at <= ?3 ORDER BY due_at, id LIMIT 1)
-             RETURNING id",
-        )
+        macro_rules! claim {
+            ($lock:literal) => {
+                concat!(
+                    "UPDATE jobs SET state = 'running', attempt = attempt + 1, worker = $1, due_at = $2, started_at = $3,
+                                     progress_step = 'waiting', progress_done = 0, progress_total = 0
+                     WHERE id = (SELECT id FROM jobs
+                                 WHERE due_at IS NOT NULL AND (due_at <= $3 OR due_at > $4)
+                                 ORDER BY turn_at, id LIMIT 1",
+                    $lock,
+                    ") RETURNING id"
+                )
+            };
+        }
+        let claimed: Option<JobId> = query(dialects! {
+            sqlite: claim!(""),
+            postgres: claim!(" FOR UPDATE SKIP LOCKED"),
+        })
         .bind(worker)
         .bind(ms_from_time(now + self.settings.lease))
         .bind(ms_from_time(now))
-        .fetch_optional(&mut *transaction)
+        .bind(ms_from_time(now + self.settings.furthest_due()))
+        .fetch_optional_value(&mut transaction)
         .await?;
         let Some(id) = claimed else {
             // Without lost jobs nothing was written: no commit, no sync of the disk on every idle look.
@@ -48,12 +60,12 @@ impl Queue {
             ended.into_iter().for_each(|id| self.announce(id));
             return Ok(None);
         };
-        let row = sqlx::query(
-            "SELECT j.*, r.session_id, NULL AS assessment_id, NULL AS noise_model_id
-             FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = ?1",
+        let row = query(
+            "SELECT j.*, NULL AS n_ahead, r.session_id, NULL AS assessment_id, NULL AS noise_model_id
+             FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = $1",
         )
         .bind(id)
-        .fetch_one(&mut *transaction)
+        .fetch_one(&mut transaction)
         .await?;
         let job = job_from_row(&row)?;
         transaction.commit().await?;
@@ -68,17 +80,17 @@ impl Queue {
     pub async fn renew(&self, id: JobId, attempt: u32, progress: Progress) -> Result<Renewal, StorageError> {
         let due_at = self.store.now() + self.settings.lease;
         let mut transaction = self.store.begin().await?;
-        let row = sqlx::query(
-            "UPDATE jobs SET due_at = ?3, progress_step = ?4, progress_done = ?5, progress_total = ?6
-             WHERE id = ?1 AND attempt = ?2 AND state = 'running' RETURNING cancel_requested",
+        let row = query(
+            "UPDATE jobs SET due_at = $3, progress_step = $4, progress_done = $5, progress_total = $6
+             WHERE id = $1 AND attempt = $2 AND state = 'running' RETURNING cancel_requested",
         )
         .bind(id)
         .bind(attempt)
         .bind(ms_from_time(due_at))
-        .bind(step_name(progress.step))
+        .bind(progress.step.name())
         .bind(i64::try_from(progress.done).unwrap_or(i64::MAX))
         .bind(i64::try_from(progress.total).unwrap_or(i64::MAX))
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         transaction.commit().await?;
         let Some(row) = row else { return Ok(Renewal::Lost) };
@@ -93,22 +105,22 @@ impl Queue {
     /// When the database fails.
     pub async fn release(&self, id: JobId, attempt: u32) -> Result<(), StorageError> {
         let mut transaction = self.store.begin().await?;
-        let released = sqlx::query(
+        let released = query(
             "UPDATE jobs SET state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'queued' END,
-                             due_at = CASE WHEN cancel_requested THEN NULL ELSE ?3 END,
-                             finished_at = CASE WHEN cancel_requested THEN ?3 END,
+                             due_at = CASE WHEN cancel_requested THEN NULL ELSE $3 END,
+                             finished_at = CASE WHEN cancel_requested THEN $3 END,
                              max_attempts = max_attempts + 1, worker = NULL, started_at = NULL,
                              progress_step = 'waiting', progress_done = 0, progress_total = 0
-             WHERE id = ?1 AND attempt = ?2 AND state = 'running'",
+             WHERE id = $1 AND attempt = $2 AND state = 'running'",
         )
         .bind(id)
         .bind(attempt)
         .bind(ms_from_time(self.store.now()))
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
-        if released.rows_affected() > 0 {
-            self.wake.notify_one();
+        if released > 0 {
+            self.wake_worker(id);
             self.announce(id);
         }
         Ok(())
@@ -117,34 +129,27 @@ impl Queue {
 
 /// Ends the jobs whose lease ran out and that must not run again: somebody asked to stop them, or they have been begun
 /// as often as they may. All others with an expired lease are simply due.
-async fn end_lost_jobs(connection: &mut SqliteConnection, now: OffsetDateTime) -> Result<Vec<JobId>, StorageError> {
+async fn end_lost_jobs(
+    connection: &mut Transaction,
+    now: OffsetDateTime,
+    furthest_due: OffsetDateTime,
+) -> Result<Vec<JobId>, StorageError> {
     let error = JobError::new(
         WORKER_LOST,
         "the process that computed this recording stopped without an answer, at every attempt; \
          the recording may need more memory than the server has",
     );
-    let ended = sqlx::query_scalar(
+    let ended = query(
         "UPDATE jobs SET state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'failed' END,
-                         error = CASE WHEN cancel_requested THEN error ELSE ?2 END,
-                         due_at = NULL, finished_at = ?1
-         WHERE state = 'running' AND due_at <= ?1 AND (cancel_requested OR attempt >= max_attempts)
+                         error = CASE WHEN cancel_requested THEN error ELSE $2 END,
+                         due_at = NULL, finished_at = $1
+         WHERE state = 'running' AND (due_at <= $1 OR due_at > $3) AND (cancel_requested OR attempt >= max_attempts)
          RETURNING id",
     )
     .bind(ms_from_time(now))
     .bind(row::readable_json("a job's error", &error)?)
-    .fetch_all(connection)
+    .bind(ms_from_time(furthest_due))
+    .fetch_values(connection)
     .await?;
     Ok(ended)
-}
-
-fn step_name(step: Step) -> &'static str {
-    match step {
-        Step::Waiting => "waiting",
-        Step::Decoding => "decoding",
-        Step::Calibrating => "calibrating",
-        Step::Estimating => "estimating",
-        Step::Smoothing => "smoothing",
-        Step::Summarizing => "summarizing",
-        Step::Saving => "saving",
-    }
 }

@@ -1,14 +1,15 @@
 //! Into the queue.
 
 use super::job::job_from_row;
+use super::turn::expected_cost;
 use super::{Job, Queue};
 use crate::assessment::Settings;
 use crate::storage::clock::ms_from_time;
+use crate::storage::database::{Transaction, query};
 use crate::storage::idempotency::{KeptAnswer, keep_answer, kept_answer};
 use crate::storage::{
     Access, JobId, NewRecording, RecordingId, StorageError, StoredRecording, StoredResponse, recordings, row,
 };
-use sqlx::SqliteConnection;
 
 /// What became of an upload that may have been sent before.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +37,7 @@ impl Queue {
         let recording = recordings::insert(&mut transaction, access, new, self.store.now()).await?;
         let job = self.insert(&mut transaction, access, recording.id, settings).await?;
         transaction.commit().await?;
-        self.wake.notify_one();
+        self.wake_worker(job.id);
         self.announce(job.id);
         Ok((recording, job))
     }
@@ -58,6 +59,7 @@ impl Queue {
     ) -> Result<Submission, StorageError> {
         let now = self.store.now();
         let mut transaction = self.store.begin().await?;
+        transaction.exclusively(&format!("idempotency {} {key}", access.client)).await?;
         if let Some(kept) = kept_answer(&mut transaction, access.client, key, now).await? {
             let same = kept.fingerprint == fingerprint;
             return Ok(if same { Submission::Replayed(kept.response) } else { Submission::KeyReused });
@@ -70,7 +72,7 @@ impl Queue {
         let kept = KeptAnswer { fingerprint, response };
         keep_answer(&mut transaction, access.client, key, &kept, now).await?;
         transaction.commit().await?;
-        self.wake.notify_one();
+        self.wake_worker(id);
         self.announce(id);
         Ok(Submission::Stored(kept.response))
     }
@@ -88,25 +90,32 @@ impl Queue {
         let mut transaction = self.store.begin().await?;
         let job = self.insert(&mut transaction, access, recording, settings).await?;
         transaction.commit().await?;
-        self.wake.notify_one();
+        self.wake_worker(job.id);
         self.announce(job.id);
         Ok(job)
     }
 
     async fn insert(
         &self,
-        connection: &mut SqliteConnection,
+        connection: &mut Transaction,
         access: &Access,
         recording: RecordingId,
         settings: &Settings,
     ) -> Result<Job, StorageError> {
         let now = ms_from_time(self.store.now());
         let id = JobId::new();
-        let inserted = sqlx::query(
-            "INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at)
-             SELECT ?1, r.organisation_id, r.id, 'queued', ?5, ?6, ?7, ?6
-             FROM recordings r JOIN sessions s ON s.id = r.session_id
-             WHERE r.organisation_id = ?2 AND (?3 IS NULL OR s.created_by = ?3) AND r.id = ?4",
+        let (base_ms, ms_per_megabyte) = expected_cost(settings);
+        let inserted = query(
+            "INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at,
+                               expected_ms, turn_at)
+             SELECT $1, one.organisation_id, one.id, 'queued', $5, $6, $7, $6, one.expected_ms,
+                    $6 + one.expected_ms
+                       + (SELECT CAST(coalesce(sum(w.expected_ms), 0) AS BIGINT) FROM jobs w
+                          WHERE w.organisation_id = one.organisation_id AND w.state = 'queued'
+                            AND w.expected_ms <= one.expected_ms)
+             FROM (SELECT r.id, r.organisation_id, $8 + r.size_bytes / 1000 * $9 / 1000 AS expected_ms
+                   FROM recordings r JOIN sessions s ON s.id = r.session_id
+                   WHERE r.organisation_id = $2 AND ($3 IS NULL OR s.created_by = $3) AND r.id = $4) one",
         )
         .bind(id)
         .bind(access.organisation)
@@ -115,14 +124,16 @@ impl Queue {
         .bind(self.settings.max_attempts)
         .bind(now)
         .bind(row::readable_json("the settings", settings)?)
+        .bind(base_ms)
+        .bind(ms_per_megabyte)
         .execute(&mut *connection)
         .await?;
-        if inserted.rows_affected() == 0 {
+        if inserted == 0 {
             return Err(StorageError::not_found("recording"));
         }
-        let row = sqlx::query(
-            "SELECT j.*, r.session_id, NULL AS assessment_id, NULL AS noise_model_id
-             FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = ?1",
+        let row = query(
+            "SELECT j.*, NULL AS n_ahead, r.session_id, NULL AS assessment_id, NULL AS noise_model_id
+             FROM jobs j JOIN recordings r ON r.id = j.recording_id WHERE j.id = $1",
         )
         .bind(id)
         .fetch_one(connection)

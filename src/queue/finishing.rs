@@ -4,8 +4,8 @@ use super::{JobError, JobState, Queue};
 use crate::assessment::{Assessment, NoiseModel};
 use crate::storage::assessments::{self, EncodedAssessment};
 use crate::storage::clock::ms_from_time;
+use crate::storage::database::{Transaction, query};
 use crate::storage::{Access, AssessmentId, JobId, NoiseModelId, RecordingId, StorageError, noise_models, row};
-use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
 use tokio::task::spawn_blocking;
 
@@ -91,14 +91,14 @@ impl Queue {
     ) -> Result<Failure, StorageError> {
         let now = self.store.now();
         let mut transaction = self.store.begin().await?;
-        let row = sqlx::query(
+        let row = query(
             "UPDATE jobs SET
                  state = CASE WHEN cancel_requested THEN 'cancelled'
-                              WHEN ?3 AND attempt < max_attempts THEN 'queued' ELSE 'failed' END,
-                 due_at = CASE WHEN NOT cancel_requested AND ?3 AND attempt < max_attempts THEN ?4 END,
-                 finished_at = CASE WHEN NOT cancel_requested AND ?3 AND attempt < max_attempts THEN NULL ELSE ?5 END,
-                 error = ?6
-             WHERE id = ?1 AND attempt = ?2 AND state = 'running' RETURNING state",
+                              WHEN $3 AND attempt < max_attempts THEN 'queued' ELSE 'failed' END,
+                 due_at = CASE WHEN NOT cancel_requested AND $3 AND attempt < max_attempts THEN $4 END,
+                 finished_at = CASE WHEN NOT cancel_requested AND $3 AND attempt < max_attempts THEN NULL ELSE $5 END,
+                 error = $6
+             WHERE id = $1 AND attempt = $2 AND state = 'running' RETURNING state",
         )
         .bind(id)
         .bind(attempt)
@@ -106,7 +106,7 @@ impl Queue {
         .bind(ms_from_time(now + self.settings.pause_after(attempt)))
         .bind(ms_from_time(now))
         .bind(row::readable_json("a job's error", error)?)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         transaction.commit().await?;
         let Some(row) = row else { return Ok(Failure::Lost) };
@@ -124,18 +124,18 @@ impl Queue {
     /// When the database fails.
     pub async fn end_cancelled(&self, id: JobId, attempt: u32) -> Result<bool, StorageError> {
         let mut transaction = self.store.begin().await?;
-        let ended = sqlx::query(
-            "UPDATE jobs SET state = 'cancelled', due_at = NULL, finished_at = ?3
-             WHERE id = ?1 AND attempt = ?2 AND state = 'running'",
+        let ended = query(
+            "UPDATE jobs SET state = 'cancelled', due_at = NULL, finished_at = $3
+             WHERE id = $1 AND attempt = $2 AND state = 'running'",
         )
         .bind(id)
         .bind(attempt)
         .bind(ms_from_time(self.store.now()))
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         self.announce(id);
-        Ok(ended.rows_affected() > 0)
+        Ok(ended > 0)
     }
 
     /// Asks to stop a job. One that waits is cancelled at once; one that runs is, as soon as its worker sees the
@@ -147,16 +147,16 @@ impl Queue {
     pub async fn cancel(&self, access: &Access, id: JobId) -> Result<super::Job, StorageError> {
         let before = self.job(access, id).await?;
         let mut transaction = self.store.begin().await?;
-        let row = sqlx::query(
-            "UPDATE jobs SET cancel_requested = 1,
-                 finished_at = CASE WHEN state = 'queued' THEN ?2 ELSE finished_at END,
+        let row = query(
+            "UPDATE jobs SET cancel_requested = TRUE,
+                 finished_at = CASE WHEN state = 'queued' THEN $2 ELSE finished_at END,
                  due_at = CASE WHEN state = 'queued' THEN NULL ELSE due_at END,
                  state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END
-             WHERE id = ?1 AND state IN ('queued', 'running', 'cancelled') RETURNING id",
+             WHERE id = $1 AND state IN ('queued', 'running', 'cancelled') RETURNING id",
         )
         .bind(before.id)
         .bind(ms_from_time(self.store.now()))
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         transaction.commit().await?;
         let Some(row) = row else {
@@ -174,20 +174,20 @@ impl Queue {
 /// Ends an attempt with its result, which the caller writes in the same transaction; the job's recording, or `None` when
 /// the job was no longer the worker's.
 async fn end_as_done(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     id: JobId,
     attempt: u32,
     now: OffsetDateTime,
 ) -> Result<Option<RecordingId>, StorageError> {
-    let recording = sqlx::query_scalar(
-        "UPDATE jobs SET state = 'done', due_at = NULL, finished_at = ?3, error = NULL, progress_step = 'saving',
+    let recording = query(
+        "UPDATE jobs SET state = 'done', due_at = NULL, finished_at = $3, error = NULL, progress_step = 'saving',
                          progress_done = 1, progress_total = 1
-         WHERE id = ?1 AND attempt = ?2 AND state = 'running' RETURNING recording_id",
+         WHERE id = $1 AND attempt = $2 AND state = 'running' RETURNING recording_id",
     )
     .bind(id)
     .bind(attempt)
     .bind(ms_from_time(now))
-    .fetch_optional(connection)
+    .fetch_optional_value(connection)
     .await?;
     Ok(recording)
 }

@@ -2,10 +2,9 @@
 
 use crate::assessment::Settings;
 use crate::progress::{Progress, Step};
+use crate::storage::database::Row;
 use crate::storage::{AssessmentId, JobId, NoiseModelId, RecordingId, SessionId, StorageError, row};
 use serde::{Deserialize, Serialize};
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use time::OffsetDateTime;
 use utoipa::ToSchema;
 
@@ -87,6 +86,8 @@ pub struct Job {
     pub worker: Option<String>,
     /// Whether somebody asked to stop it.
     pub cancel_requested: bool,
+    /// How many waiting jobs have their turn before it; `None` unless it waits and was asked for by itself.
+    pub n_ahead: Option<u64>,
     /// How far the latest attempt is.
     pub progress: Progress,
     /// What is to be computed.
@@ -115,18 +116,19 @@ pub struct JobFilter {
 }
 
 /// A row of `jobs` with `session_id`, `assessment_id` and `noise_model_id` beside it.
-pub(super) fn job_from_row(row: &SqliteRow) -> Result<Job, StorageError> {
+pub(super) fn job_from_row(row: &Row) -> Result<Job, StorageError> {
     let step: Step = row::word(row, "progress_step")?;
     Ok(Job {
         id: row.try_get("id")?,
         recording_id: row.try_get("recording_id")?,
         session_id: row.try_get("session_id")?,
         state: row::word(row, "state")?,
-        attempt: row::small_count(row, "attempt")?,
-        max_attempts: row::small_count(row, "max_attempts")?,
+        attempt: row::small(row, "attempt")?,
+        max_attempts: row::small(row, "max_attempts")?,
         due_at: row::optional_time(row, "due_at")?,
         worker: row.try_get("worker")?,
         cancel_requested: row.try_get("cancel_requested")?,
+        n_ahead: row::optional_small(row, "n_ahead")?,
         progress: Progress { step, done: row::count(row, "progress_done")?, total: row::count(row, "progress_total")? },
         settings: row::json(row, "settings")?,
         error: row::optional_json(row, "error")?,

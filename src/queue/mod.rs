@@ -21,21 +21,28 @@ mod claiming;
 mod enqueueing;
 mod finishing;
 mod job;
+mod messenger;
 mod questions;
+mod turn;
 
 pub use claiming::Renewal;
 pub use enqueueing::Submission;
 pub use finishing::{Failure, Finish, Trained};
 pub use job::{Job, JobError, JobFilter, JobState};
+pub use messenger::{Deliveries, Delivery, Messenger};
+pub use turn::Crowded;
 
 use crate::config::Config;
 use crate::storage::{JobId, Store};
 use std::sync::Arc;
 use time::Duration;
 use tokio::sync::{Notify, broadcast};
+use tokio_util::sync::CancellationToken;
 
 /// Code of the error of a job whose workers fell silent too often.
 pub const WORKER_LOST: &str = "worker_lost";
+/// How far the clocks of machines that share a queue may be apart.
+const CLOCK_SLACK: Duration = Duration::minutes(1);
 /// Changes that a slow watcher may fall behind before it misses some; it asks the table then.
 const CHANGES_KEPT: usize = 1024;
 
@@ -50,6 +57,10 @@ pub struct QueueSettings {
     pub first_pause: Duration,
     /// Longest pause between two attempts.
     pub longest_pause: Duration,
+    /// How many jobs may wait in all.
+    pub most_waiting: u64,
+    /// How many jobs of one organisation may wait.
+    pub most_waiting_of_organisation: u64,
 }
 
 impl Default for QueueSettings {
@@ -65,11 +76,19 @@ impl From<&Config> for QueueSettings {
             max_attempts: config.max_attempts.max(1),
             first_pause: Duration::seconds(2),
             longest_pause: Duration::minutes(5),
+            most_waiting: config.max_waiting_jobs,
+            most_waiting_of_organisation: config.max_waiting_jobs_of_organisation,
         }
     }
 }
 
 impl QueueSettings {
+    /// How far ahead the time at which a job is due can lie. One that lies further was written by a clock that has been set back
+    /// since, and counts as past: nobody would wait for it.
+    fn furthest_due(&self) -> Duration {
+        self.lease.max(self.longest_pause) + CLOCK_SLACK
+    }
+
     /// Pause after a failed attempt, the first being 1.
     fn pause_after(&self, attempt: u32) -> Duration {
         // 2^20 times two seconds is far beyond any longest pause, and within a Duration.
@@ -85,12 +104,21 @@ pub struct Queue {
     settings: QueueSettings,
     wake: Arc<Notify>,
     changes: broadcast::Sender<JobId>,
+    messenger: Messenger,
 }
 
 impl Queue {
     /// The queue of a store. Make one per process and clone it: the signals reach the clones only.
     pub fn new(store: Store, settings: QueueSettings) -> Self {
-        Self { store, settings, wake: Arc::new(Notify::new()), changes: broadcast::channel(CHANGES_KEPT).0 }
+        let changes = broadcast::channel(CHANGES_KEPT).0;
+        Self { store, settings, wake: Arc::new(Notify::new()), changes, messenger: Messenger::default() }
+    }
+
+    /// The same queue, whose news also go to other machines, and come from there until `shutdown`.
+    #[must_use]
+    pub fn with_messenger(self, messenger: Messenger, shutdown: &CancellationToken) -> Self {
+        messenger.listen(&self.changes, shutdown);
+        Self { messenger, ..self }
     }
 
     /// The store that holds the jobs.
@@ -114,9 +142,20 @@ impl Queue {
         self.changes.subscribe()
     }
 
+    /// News from other machines that jobs wait, for one worker.
+    pub fn deliveries(&self) -> Deliveries {
+        self.messenger.deliveries()
+    }
+
+    fn wake_worker(&self, id: JobId) {
+        self.wake.notify_one();
+        self.messenger.tell_waiting(id);
+    }
+
     fn announce(&self, id: JobId) {
         // An error says that nobody watches.
         let _ = self.changes.send(id);
+        self.messenger.tell_changed(id);
     }
 }
 

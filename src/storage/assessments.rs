@@ -2,6 +2,7 @@
 //! changed.
 
 use super::clock::ms_from_time;
+use super::database::{Row, Transaction, dialects, query};
 use super::joint_tracks::{self, EncodedTrack};
 use super::measures;
 use super::series::{self, EncodedSeries};
@@ -10,8 +11,6 @@ use super::{
 };
 use crate::assessment::quality::CalibrationQuality;
 use crate::assessment::{Assessment, ChannelSummary, Gait, Performance, Provenance, Quality};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
 
 /// An assessment without its series; [`Store::series_of_assessment`] brings those.
@@ -68,7 +67,7 @@ pub struct AssessmentFilter {
     pub method: Option<String>,
 }
 
-fn assessment_from_row(row: &SqliteRow) -> Result<StoredAssessment, StorageError> {
+fn assessment_from_row(row: &Row) -> Result<StoredAssessment, StorageError> {
     Ok(StoredAssessment {
         id: row.try_get("id")?,
         recording_id: row.try_get("recording_id")?,
@@ -136,18 +135,18 @@ fn with_json(performance: &Performance) -> Result<(String, Performance), Storage
 
 /// Inserts an assessment inside the transaction that ends its job, and what it measured of the patient.
 pub(crate) async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     recording_id: RecordingId,
     job_id: JobId,
     encoded: &EncodedAssessment,
     now: OffsetDateTime,
 ) -> Result<AssessmentId, StorageError> {
     let id = AssessmentId::new();
-    sqlx::query(
+    query(
         "INSERT INTO assessments (id, organisation_id, recording_id, job_id, pipeline, method, channels, summary, quality, provenance,
                                   n_samples, start_time_ns, end_time_ns, created_at, gait, performance)
-         SELECT ?1, r.organisation_id, r.id, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15
-         FROM recordings r WHERE r.id = ?2",
+         SELECT $1, r.organisation_id, r.id, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15
+         FROM recordings r WHERE r.id = $2",
     )
     .bind(id)
     .bind(recording_id)
@@ -182,10 +181,10 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn assessment(&self, access: &Access, id: AssessmentId) -> Result<StoredAssessment, StorageError> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT a.*, r.session_id, s.patient_id
              FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE a.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
+             WHERE a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2) AND a.id = $3",
         )
         .bind(access.organisation)
         .bind(access.only_sessions_of())
@@ -213,27 +212,27 @@ impl Store {
                     "SELECT a.*, r.session_id, s.patient_id
                      FROM assessments a JOIN recordings r ON r.id = a.recording_id
                           JOIN sessions s ON s.id = r.session_id
-                     WHERE a.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
-                       AND a.id < ?3
-                       AND (?7 IS NULL OR a.pipeline = ?7)
-                       AND (?8 IS NULL OR a.method = ?8)
+                     WHERE a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)
+                       AND a.id < $3
+                       AND ($7 IS NULL OR a.pipeline = $7)
+                       AND ($8 IS NULL OR a.method = $8)
                        AND ",
                     $indexed,
-                    " ORDER BY a.id DESC LIMIT ?9"
+                    " ORDER BY a.id DESC LIMIT $9"
                 )
             };
         }
         let question = match (filter.recording_id, filter.session_id, filter.patient_id) {
             (Some(_), _, _) => assessments_where!(
-                "a.recording_id = ?4 AND (?5 IS NULL OR r.session_id = ?5) AND (?6 IS NULL OR s.patient_id = ?6)"
+                "a.recording_id = $4 AND ($5 IS NULL OR r.session_id = $5) AND ($6 IS NULL OR s.patient_id = $6)"
             ),
             (None, Some(_), _) => {
-                assessments_where!("?4 IS NULL AND r.session_id = ?5 AND (?6 IS NULL OR s.patient_id = ?6)")
+                assessments_where!("$4 IS NULL AND r.session_id = $5 AND ($6 IS NULL OR s.patient_id = $6)")
             }
-            (None, None, Some(_)) => assessments_where!("?4 IS NULL AND ?5 IS NULL AND s.patient_id = ?6"),
-            (None, None, None) => assessments_where!("?4 IS NULL AND ?5 IS NULL AND ?6 IS NULL"),
+            (None, None, Some(_)) => assessments_where!("$4 IS NULL AND $5 IS NULL AND s.patient_id = $6"),
+            (None, None, None) => assessments_where!("$4 IS NULL AND $5 IS NULL AND $6 IS NULL"),
         };
-        let rows = sqlx::query(question)
+        let rows = query(question)
             .bind(access.organisation)
             .bind(access.only_sessions_of())
             .bind(page.cursor())
@@ -259,20 +258,36 @@ impl Store {
         &self,
         job: JobId,
     ) -> Result<Option<(AssessmentId, CalibrationQuality)>, StorageError> {
-        let row = sqlx::query(
-            "SELECT a.id, a.quality -> '$.calibration' AS calibration,
-                    a.quality ->> '$.calibration.source' = 'static_window' AS is_static,
-                    a.quality ->> '$.calibration.measured_uncertainty_m' AS uncertainty
-             FROM jobs j
-                  JOIN recordings own ON own.id = j.recording_id
-                  JOIN sessions own_session ON own_session.id = own.session_id
-                  JOIN sessions s ON s.patient_id = own_session.patient_id
-                                 AND s.organisation_id = j.organisation_id
-                  JOIN recordings r ON r.session_id = s.id AND r.id <> own.id
-                  JOIN assessments a ON a.recording_id = r.id AND a.organisation_id = j.organisation_id
-             WHERE j.id = ?1 AND uncertainty IS NOT NULL
-             ORDER BY is_static DESC, CASE WHEN is_static THEN 0 ELSE uncertainty END, a.id DESC LIMIT 1",
-        )
+        macro_rules! calibrations {
+            ($in_json:literal) => {
+                concat!(
+                    "SELECT id, calibration FROM (SELECT a.id, ",
+                    $in_json,
+                    " FROM jobs j
+                           JOIN recordings own ON own.id = j.recording_id
+                           JOIN sessions own_session ON own_session.id = own.session_id
+                           JOIN sessions s ON s.patient_id = own_session.patient_id
+                                          AND s.organisation_id = j.organisation_id
+                           JOIN recordings r ON r.session_id = s.id AND r.id <> own.id
+                           JOIN assessments a ON a.recording_id = r.id AND a.organisation_id = j.organisation_id
+                      WHERE j.id = $1) found
+                     WHERE uncertainty IS NOT NULL
+                     ORDER BY is_static DESC, CASE WHEN is_static = 1 THEN 0 ELSE uncertainty END, id DESC LIMIT 1"
+                )
+            };
+        }
+        let row = query(dialects! {
+            sqlite: calibrations!(
+                "a.quality -> '$.calibration' AS calibration,
+                 CASE WHEN a.quality ->> '$.calibration.source' = 'static_window' THEN 1 ELSE 0 END AS is_static,
+                 a.quality ->> '$.calibration.measured_uncertainty_m' AS uncertainty"
+            ),
+            postgres: calibrations!(
+                "a.quality::json ->> 'calibration' AS calibration,
+                 CASE WHEN a.quality::json #>> '{calibration,source}' = 'static_window' THEN 1 ELSE 0 END AS is_static,
+                 (a.quality::json #>> '{calibration,measured_uncertainty_m}')::float8 AS uncertainty"
+            ),
+        })
         .bind(job)
         .fetch_optional(self.reader())
         .await?;
@@ -285,10 +300,10 @@ impl Store {
         access: &Access,
         id: AssessmentId,
     ) -> Result<Vec<String>, StorageError> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT a.channels
              FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE a.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND a.id = ?3",
+             WHERE a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2) AND a.id = $3",
         )
         .bind(access.organisation)
         .bind(access.only_sessions_of())

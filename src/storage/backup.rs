@@ -4,11 +4,12 @@
 //! digests that is written last. Rows name only blobs that were on the disk before them and never change, so blobs that are
 //! copied after the database fit it, whatever is written meanwhile.
 
+use super::database::{Row, query};
 use super::{DATABASE_FILE, StorageError, Store, StoredBlob, row};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
-use sqlx::{ConnectOptions, Connection, Row};
+use sqlx::{ConnectOptions, Connection};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -80,7 +81,7 @@ impl Store {
         let target = database.to_str().ok_or_else(|| StorageError::Corrupt("the path is not text".to_owned()))?;
         // One transaction of SQLite's own: a consistent state, without pages that deleted rows stood in. On a connection of
         // its own, so that nobody waits to write meanwhile.
-        let mut connection = self.writer.connect_options().as_ref().clone().connect().await?;
+        let mut connection = self.database.sqlite_writer()?.connect_options().as_ref().clone().connect().await?;
         sqlx::query("VACUUM INTO ?1").bind(target).execute(&mut connection).await?;
         connection.close().await?;
         let blobs = blobs_of(&database).await?;
@@ -104,18 +105,19 @@ impl Store {
     /// When the database cannot be asked at all.
     pub async fn ailments(&self, reads_blobs: bool) -> Result<Vec<Ailment>, StorageError> {
         let mut found = Vec::new();
-        let complaints: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check").fetch_all(self.reader()).await?;
+        self.database.sqlite_writer()?;
+        let complaints: Vec<String> = query("PRAGMA integrity_check").fetch_values(self.reader()).await?;
         found.extend(complaints.into_iter().filter(|complaint| complaint != "ok").map(|complaint| Ailment {
             code: "database_damaged",
             is_damage: true,
             sentence: format!("the database says: {complaint}; restore a backup"),
         }));
-        let dangling = sqlx::query("PRAGMA foreign_key_check").fetch_all(self.reader()).await?;
+        let dangling = query("PRAGMA foreign_key_check").fetch_all(self.reader()).await?;
         if !dangling.is_empty() {
             let sentence = format!("{} rows refer to rows that are not there; restore a backup", dangling.len());
             found.push(Ailment { code: "database_damaged", is_damage: true, sentence });
         }
-        let rows = sqlx::query(BLOBS).fetch_all(self.reader()).await?;
+        let rows = query(BLOBS).fetch_all(self.reader()).await?;
         let blobs = rows.iter().map(blob_from_row).collect::<Result<Vec<_>, _>>()?;
         for blob in &blobs {
             found.extend(self.ailment_of_blob(blob, reads_blobs).await?);
@@ -183,10 +185,10 @@ async fn blobs_of(database: &Path) -> Result<Vec<BackupBlob>, StorageError> {
     let options = SqliteConnectOptions::new().filename(database).read_only(true);
     let mut connection: SqliteConnection = options.connect().await?;
     let rows = sqlx::query(BLOBS).fetch_all(&mut connection).await?;
-    rows.iter().map(blob_from_row).collect()
+    rows.into_iter().map(|row| blob_from_row(&Row::Sqlite(row))).collect()
 }
 
-fn blob_from_row(row: &sqlx::sqlite::SqliteRow) -> Result<BackupBlob, StorageError> {
+fn blob_from_row(row: &Row) -> Result<BackupBlob, StorageError> {
     Ok(BackupBlob {
         key: row.try_get("blob_key")?,
         sha256: row.try_get("sha256")?,
@@ -280,7 +282,7 @@ mod tests {
         let mut writer = store.blobs().writer().await.unwrap();
         writer.write(Bytes::from_static(b"a recording")).await.unwrap();
         let blob = writer.seal().await.unwrap().keep().await.unwrap();
-        let mut connection = store.writer.acquire().await.unwrap();
+        let mut connection = store.database.sqlite_writer().unwrap().acquire().await.unwrap();
         for statement in [
             "INSERT INTO organisations VALUES (zeroblob(16), 'o', 0)",
             "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at)

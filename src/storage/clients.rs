@@ -2,14 +2,13 @@
 //! passwords: nobody guesses 256 random bits.
 
 use super::clock::ms_from_time;
+use super::database::{Row, Transaction, query};
 use super::known_keys::{KeyDigest, Known};
 use super::{Access, ClientId, OrganisationId, StorageError, Store, organisations, row};
 use rand::TryRng;
 use rand::rngs::SysRng;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use std::fmt;
 use time::{Duration, OffsetDateTime};
 use utoipa::ToSchema;
@@ -107,7 +106,7 @@ impl fmt::Debug for ApiKey {
     }
 }
 
-pub(super) fn client_from_row(row: &SqliteRow) -> Result<Client, StorageError> {
+pub(super) fn client_from_row(row: &Row) -> Result<Client, StorageError> {
     Ok(Client {
         id: row.try_get("id")?,
         organisation_id: row.try_get("organisation_id")?,
@@ -120,16 +119,16 @@ pub(super) fn client_from_row(row: &SqliteRow) -> Result<Client, StorageError> {
 }
 
 async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     organisation: OrganisationId,
     role: Role,
     label: &str,
     now: OffsetDateTime,
 ) -> Result<(Client, ApiKey), StorageError> {
     let key = ApiKey::generate()?;
-    let row = sqlx::query(
+    let row = query(
         "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at)
-         SELECT ?1, o.id, ?3, ?4, ?5, ?6 FROM organisations o WHERE o.id = ?2 RETURNING *",
+         SELECT $1, o.id, $3, $4, $5, $6 FROM organisations o WHERE o.id = $2 RETURNING *",
     )
     .bind(ClientId::new())
     .bind(organisation)
@@ -167,14 +166,14 @@ impl Store {
     /// When the database fails.
     pub async fn ensure_first_admin(&self) -> Result<Option<ApiKey>, StorageError> {
         let mut transaction = self.begin().await?;
-        let clients: i64 = sqlx::query_scalar("SELECT count(*) FROM clients").fetch_one(&mut *transaction).await?;
+        transaction.exclusively("first admin").await?;
+        let clients: i64 = query("SELECT count(*) FROM clients").fetch_value(&mut transaction).await?;
         if clients > 0 {
             return Ok(None);
         }
         let now = self.now();
-        let existing: Option<OrganisationId> = sqlx::query_scalar("SELECT id FROM organisations ORDER BY id LIMIT 1")
-            .fetch_optional(&mut *transaction)
-            .await?;
+        let existing: Option<OrganisationId> =
+            query("SELECT id FROM organisations ORDER BY id LIMIT 1").fetch_optional_value(&mut transaction).await?;
         let organisation = match existing {
             Some(id) => id,
             None => organisations::insert(&mut transaction, FIRST_ORGANISATION, now).await?.id,
@@ -197,7 +196,7 @@ impl Store {
             Known::Nothing { changes } => changes,
         };
         // Comparing digests in the index leaks at most a prefix of a digest, from which no key can be made.
-        let row = sqlx::query("SELECT * FROM clients WHERE key_sha256 = ?1 AND revoked_at IS NULL")
+        let row = query("SELECT * FROM clients WHERE key_sha256 = $1 AND revoked_at IS NULL")
             .bind(&digest[..])
             .fetch_optional(self.reader())
             .await?;
@@ -212,11 +211,14 @@ impl Store {
 
     async fn note_use(&self, client: ClientId, now: OffsetDateTime) -> Result<(), StorageError> {
         let mut transaction = self.begin().await?;
-        sqlx::query("UPDATE clients SET last_used_at = max(coalesce(last_used_at, ?2), ?2) WHERE id = ?1")
-            .bind(client)
-            .bind(ms_from_time(now))
-            .execute(&mut *transaction)
-            .await?;
+        query(
+            "UPDATE clients SET last_used_at = $2
+                     WHERE id = $1 AND (last_used_at IS NULL OR last_used_at < $2)",
+        )
+        .bind(client)
+        .bind(ms_from_time(now))
+        .execute(&mut transaction)
+        .await?;
         Ok(transaction.commit().await?)
     }
 
@@ -225,7 +227,7 @@ impl Store {
     /// # Errors
     /// When the database fails.
     pub async fn clients(&self, organisation: OrganisationId) -> Result<Vec<Client>, StorageError> {
-        let rows = sqlx::query("SELECT * FROM clients WHERE organisation_id = ?1 ORDER BY id")
+        let rows = query("SELECT * FROM clients WHERE organisation_id = $1 ORDER BY id")
             .bind(organisation)
             .fetch_all(self.reader())
             .await?;
@@ -238,13 +240,13 @@ impl Store {
     /// `NotFound` when the organisation has no such client.
     pub async fn revoke_client(&self, organisation: OrganisationId, id: ClientId) -> Result<Client, StorageError> {
         let mut transaction = self.begin().await?;
-        let row = sqlx::query(
-            "UPDATE clients SET revoked_at = coalesce(revoked_at, ?3) WHERE id = ?1 AND organisation_id = ?2 RETURNING *",
+        let row = query(
+            "UPDATE clients SET revoked_at = coalesce(revoked_at, $3) WHERE id = $1 AND organisation_id = $2 RETURNING *",
         )
         .bind(id)
         .bind(organisation)
         .bind(ms_from_time(self.now()))
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?
         .ok_or(StorageError::not_found("client"))?;
         transaction.commit().await?;

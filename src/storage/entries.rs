@@ -2,14 +2,13 @@
 //! and plans the newest counts as a whole.
 
 use super::clock::ms_from_time;
+use super::database::{Column, Row, query};
 use super::{
     Access, MeasurementId, Page, PageRequest, PatientId, QuestionnaireId, StorageError, Store, TrainingPlanId,
     measures, row,
 };
 use crate::fall_risk::{Answers, Measures};
 use crate::report::TrainingPlan;
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use time::OffsetDateTime;
 
 /// One entry.
@@ -47,14 +46,14 @@ macro_rules! entries {
                 content: &$content,
             ) -> Result<Entry<$id, $content>, StorageError> {
                 let mut transaction = self.begin().await?;
-                let row = sqlx::query(concat!(
+                let row = query(concat!(
                     "INSERT INTO ",
                     $table,
                     " (id, organisation_id, patient_id, created_by, ",
                     $column,
                     ", created_at)
-                     SELECT ?1, p.organisation_id, p.id, ?4, ?5, ?6 FROM patients p
-                     WHERE p.organisation_id = ?2 AND p.id = ?3 RETURNING *",
+                     SELECT $1, p.organisation_id, p.id, $4, $5, $6 FROM patients p
+                     WHERE p.organisation_id = $2 AND p.id = $3 RETURNING *",
                 ))
                 .bind($id::new())
                 .bind(access.organisation)
@@ -62,7 +61,7 @@ macro_rules! entries {
                 .bind(access.client)
                 .bind(row::readable_json($column, content)?)
                 .bind(ms_from_time(self.now()))
-                .fetch_optional(&mut *transaction)
+                .fetch_optional(&mut transaction)
                 .await?
                 .ok_or(StorageError::not_found("patient"))?;
                 transaction.commit().await?;
@@ -80,11 +79,11 @@ macro_rules! entries {
                 page: &PageRequest<$id>,
             ) -> Result<Page<Entry<$id, $content>, $id>, StorageError> {
                 self.patient(access, patient).await?;
-                let rows = sqlx::query(concat!(
+                let rows = query(concat!(
                     "SELECT * FROM ",
                     $table,
-                    " WHERE organisation_id = ?1 AND patient_id = ?2 AND id < ?3
-                     ORDER BY id DESC LIMIT ?4",
+                    " WHERE organisation_id = $1 AND patient_id = $2 AND id < $3
+                     ORDER BY id DESC LIMIT $4",
                 ))
                 .bind(access.organisation)
                 .bind(patient)
@@ -106,10 +105,10 @@ macro_rules! entries {
                 patient: PatientId,
                 by: OffsetDateTime,
             ) -> Result<Option<Entry<$id, $content>>, StorageError> {
-                let row = sqlx::query(concat!(
+                let row = query(concat!(
                     "SELECT * FROM ",
                     $table,
-                    " WHERE organisation_id = ?1 AND patient_id = ?2 AND created_at <= ?3
+                    " WHERE organisation_id = $1 AND patient_id = $2 AND created_at <= $3
                      ORDER BY id DESC LIMIT 1",
                 ))
                 .bind(access.organisation)
@@ -126,14 +125,11 @@ macro_rules! entries {
 entries!("questionnaires", "answers", QuestionnaireId, Answers, add_answers, answers_of_patient, newest_answers);
 entries!("training_plans", "plan", TrainingPlanId, TrainingPlan, add_plan, plans_of_patient, newest_plan);
 
-fn entry_from_row<'r, Id, T>(row: &'r SqliteRow, content: T) -> Result<Entry<Id, T>, StorageError>
-where
-    Id: sqlx::Decode<'r, sqlx::Sqlite> + sqlx::Type<sqlx::Sqlite>,
-{
+fn entry_from_row<'r, Id: Column<'r>, T>(row: &'r Row, content: T) -> Result<Entry<Id, T>, StorageError> {
     Ok(Entry { id: row.try_get("id")?, content, created_at: row::time(row, "created_at")? })
 }
 
-fn occasion_from_row(row: &SqliteRow) -> Result<Entry<MeasurementId, Occasion>, StorageError> {
+fn occasion_from_row(row: &Row) -> Result<Entry<MeasurementId, Occasion>, StorageError> {
     let content = Occasion { measured_at: row::time(row, "measured_at")?, measures: row::json(row, "measures")? };
     entry_from_row(row, content)
 }
@@ -151,10 +147,10 @@ impl Store {
     ) -> Result<Entry<MeasurementId, Occasion>, StorageError> {
         let mut transaction = self.begin().await?;
         let id = MeasurementId::new();
-        let row = sqlx::query(
+        let row = query(
             "INSERT INTO measurements (id, organisation_id, patient_id, created_by, measured_at, measures, created_at)
-             SELECT ?1, p.organisation_id, p.id, ?4, ?5, ?6, ?7 FROM patients p
-             WHERE p.organisation_id = ?2 AND p.id = ?3 RETURNING *",
+             SELECT $1, p.organisation_id, p.id, $4, $5, $6, $7 FROM patients p
+             WHERE p.organisation_id = $2 AND p.id = $3 RETURNING *",
         )
         .bind(id)
         .bind(access.organisation)
@@ -163,7 +159,7 @@ impl Store {
         .bind(ms_from_time(occasion.measured_at))
         .bind(row::readable_json("measures", &occasion.measures)?)
         .bind(ms_from_time(self.now()))
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?
         .ok_or(StorageError::not_found("patient"))?;
         measures::insert_entered(&mut transaction, id, &occasion.measures).await?;
@@ -182,9 +178,9 @@ impl Store {
         page: &PageRequest<MeasurementId>,
     ) -> Result<Page<Entry<MeasurementId, Occasion>, MeasurementId>, StorageError> {
         self.patient(access, patient).await?;
-        let rows = sqlx::query(
-            "SELECT * FROM measurements WHERE organisation_id = ?1 AND patient_id = ?2 AND id < ?3
-             ORDER BY id DESC LIMIT ?4",
+        let rows = query(
+            "SELECT * FROM measurements WHERE organisation_id = $1 AND patient_id = $2 AND id < $3
+             ORDER BY id DESC LIMIT $4",
         )
         .bind(access.organisation)
         .bind(patient)

@@ -45,6 +45,20 @@ impl StorageError {
         Self::NotFound { what }
     }
 
+    /// True when the disk, or what stands for it, is full.
+    pub fn is_out_of_space(&self) -> bool {
+        match self {
+            Self::Blob { source, .. } => {
+                matches!(source.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded)
+            }
+            // SQLITE_FULL, and PostgreSQL's class for insufficient resources: disk_full.
+            Self::Database(sqlx::Error::Database(error)) => {
+                error.code().is_some_and(|code| code == "13" || code == "53100")
+            }
+            _ => false,
+        }
+    }
+
     pub(crate) fn blob(doing: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Blob { doing, source }
     }

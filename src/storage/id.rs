@@ -1,5 +1,6 @@
 //! Identities: one newtype per kind of row, so that a patient's id can never be passed for a session's.
 
+use super::database::{Bind, Value};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -29,6 +30,14 @@ macro_rules! ids {
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 self.0.fmt(f)
+            }
+        }
+
+        impl<'q> Bind<'q> for $name {
+            const ABSENT: Value<'static> = Value::Id(None);
+
+            fn value(self) -> Value<'q> {
+                Value::Id(Some(self.0))
             }
         }
 
@@ -73,6 +82,11 @@ ids! {
     MeasureId;
     /// Identity of a training plan: what a patient is to train at home.
     TrainingPlanId;
+}
+
+/// Ids as one parameter: a list in JSON, of hexadecimal digits alone, since JSON cannot carry what a column may hold as bytes.
+pub(super) fn list_of_ids(ids: impl Iterator<Item = Uuid>) -> String {
+    serde_json::Value::from_iter(ids.map(|id| id.simple().to_string())).to_string()
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@
 //! effect is there and the key does not know of it.
 
 use super::clock::ms_from_time;
+use super::database::{Transaction, query};
 use super::{ClientId, StorageError, row};
-use sqlx::{Row, SqliteConnection};
 use time::{Duration, OffsetDateTime};
 
 /// How long the answer is kept.
@@ -31,14 +31,14 @@ pub(crate) struct KeptAnswer {
 /// The answer that is kept under a key. Inside the caller's transaction, so that nobody else can use the key between
 /// this look and [`keep_answer`].
 pub(crate) async fn kept_answer(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     client: ClientId,
     key: &str,
     now: OffsetDateTime,
 ) -> Result<Option<KeptAnswer>, StorageError> {
-    let row = sqlx::query(
+    let row = query(
         "SELECT fingerprint, status, headers, body FROM idempotency_keys
-         WHERE client_id = ?1 AND key = ?2 AND expires_at > ?3",
+         WHERE client_id = $1 AND key = $2 AND expires_at > $3",
     )
     .bind(client)
     .bind(key)
@@ -47,7 +47,7 @@ pub(crate) async fn kept_answer(
     .await?;
     let Some(row) = row else { return Ok(None) };
     let response = StoredResponse {
-        status: row.try_get("status")?,
+        status: row::small(&row, "status")?,
         headers: row::json(&row, "headers")?,
         body: row.try_get("body")?,
     };
@@ -56,19 +56,19 @@ pub(crate) async fn kept_answer(
 
 /// Keeps the answer to a request under its key, and forgets those that are too old.
 pub(crate) async fn keep_answer(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     client: ClientId,
     key: &str,
     answer: &KeptAnswer,
     now: OffsetDateTime,
 ) -> Result<(), StorageError> {
-    sqlx::query("DELETE FROM idempotency_keys WHERE expires_at <= ?1")
+    query("DELETE FROM idempotency_keys WHERE expires_at <= $1")
         .bind(ms_from_time(now))
         .execute(&mut *connection)
         .await?;
-    sqlx::query(
+    query(
         "INSERT INTO idempotency_keys (client_id, key, fingerprint, status, headers, body, created_at, expires_at)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
     )
     .bind(client)
     .bind(key)

@@ -1,11 +1,10 @@
 //! Where joints were in a recording that was assessed.
 
+use super::database::{Row, Transaction, query};
 use super::series::codec::{Decoder, Encoder};
 use super::{Access, AssessmentId, StorageError, Store, row};
 use crate::assessment::JointTrack;
 use crate::body::Joint;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use tokio::task::spawn_blocking;
 
 /// Most values of a track that is read: five hours of 25 joints at 60 frames a second.
@@ -42,20 +41,18 @@ impl EncodedTrack {
 
 /// Inserts a track inside the caller's transaction.
 pub(super) async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     id: AssessmentId,
     encoded: &EncodedTrack,
 ) -> Result<(), StorageError> {
-    sqlx::query(
-        "INSERT INTO joint_tracks (assessment_id, joints, n_frames, time, positions) VALUES (?1, ?2, ?3, ?4, ?5)",
-    )
-    .bind(id)
-    .bind(&encoded.joints)
-    .bind(encoded.n_frames)
-    .bind(&encoded.time)
-    .bind(&encoded.positions)
-    .execute(connection)
-    .await?;
+    query("INSERT INTO joint_tracks (assessment_id, joints, n_frames, time, positions) VALUES ($1, $2, $3, $4, $5)")
+        .bind(id)
+        .bind(&encoded.joints)
+        .bind(encoded.n_frames)
+        .bind(&encoded.time)
+        .bind(&encoded.positions)
+        .execute(connection)
+        .await?;
     Ok(())
 }
 
@@ -70,7 +67,7 @@ impl Store {
         id: AssessmentId,
     ) -> Result<Option<JointTrack>, StorageError> {
         self.channels_of_assessment(access, id).await?;
-        let row = sqlx::query("SELECT joints, n_frames, time, positions FROM joint_tracks WHERE assessment_id = ?1")
+        let row = query("SELECT joints, n_frames, time, positions FROM joint_tracks WHERE assessment_id = $1")
             .bind(id)
             .fetch_optional(self.reader())
             .await?;
@@ -80,7 +77,7 @@ impl Store {
     }
 }
 
-fn track_from_row(row: &SqliteRow) -> Result<JointTrack, StorageError> {
+fn track_from_row(row: &Row) -> Result<JointTrack, StorageError> {
     let joints: Vec<Joint> = row::json(row, "joints")?;
     let n_frames = usize::try_from(row::count(row, "n_frames")?).unwrap_or(usize::MAX);
     let n_values = n_frames.saturating_mul(3 * joints.len());

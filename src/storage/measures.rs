@@ -4,6 +4,7 @@
 //! asks for what was known at an earlier time.
 
 use super::clock::ms_from_time;
+use super::database::{Row, Transaction, query};
 use super::{
     Access, AssessmentId, MeasureId, MeasurementId, Page, PageRequest, PatientId, SessionId, StorageError, Store, row,
 };
@@ -12,8 +13,6 @@ use crate::body::Side;
 use crate::fall_risk::Measures;
 use crate::report::measure::{title_of, unit_of};
 use crate::report::{MeasureRecord, MeasureSource};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
 use uuid::Uuid;
 
@@ -28,15 +27,15 @@ pub struct MeasureFilter {
     pub measured: [Option<OffsetDateTime>; 2],
 }
 
-/// Values that an assessment of the same recording that came later, but by `?3`, has replaced are left out.
+/// Values that an assessment of the same recording that came later, but by `$3`, has replaced are left out.
 macro_rules! not_replaced {
     () => {
         "NOT EXISTS (SELECT 1 FROM assessments later WHERE later.recording_id = m.recording_id
-                     AND later.id > m.assessment_id AND later.performance IS NOT NULL AND later.created_at <= ?3)"
+                     AND later.id > m.assessment_id AND later.performance IS NOT NULL AND later.created_at <= $3)"
     };
 }
 
-fn measure_from_row(row: &SqliteRow) -> Result<MeasureRecord, StorageError> {
+fn measure_from_row(row: &Row) -> Result<MeasureRecord, StorageError> {
     let entered: Option<Uuid> = row.try_get("measurement_id")?;
     let source = match entered {
         Some(measurement_id) => MeasureSource::Entered { measurement_id },
@@ -56,7 +55,7 @@ fn measure_from_row(row: &SqliteRow) -> Result<MeasureRecord, StorageError> {
         side: Side::BOTH.into_iter().find(|known| known.name() == side),
         value: row.try_get("value")?,
         standard_error: row.try_get("standard_error")?,
-        n_observations: row.try_get("n_observations")?,
+        n_observations: row::optional_small(row, "n_observations")?,
         error_sd: row.try_get("error_sd")?,
         definition: Some(definition).filter(|definition| !definition.is_empty()),
         protocol: row.try_get("protocol")?,
@@ -70,7 +69,7 @@ fn measure_from_row(row: &SqliteRow) -> Result<MeasureRecord, StorageError> {
 /// Inserts what an assessment measured, inside the transaction that stores it. Measures without a value are told by the
 /// assessment alone.
 pub(super) async fn insert_performance(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     assessment: AssessmentId,
     performance: &Performance,
     now: OffsetDateTime,
@@ -82,23 +81,23 @@ pub(super) async fn insert_performance(
         &performance.measures
     {
         let Some(value) = value.filter(|value| value.is_finite()) else { continue };
-        sqlx::query(
+        query(
             "INSERT INTO measures (id, organisation_id, patient_id, name, side, value, standard_error, n_observations,
                                    error_sd, definition, protocol, reason, assessment_id, recording_id, session_id,
                                    measured_at, created_at)
-             SELECT ?1, a.organisation_id, s.patient_id, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, a.id, r.id, s.id,
-                    s.started_at, ?12
+             SELECT $1, a.organisation_id, s.patient_id, $3, $4, $5, $6, $7, $8, $9, $10, $11, a.id, r.id, s.id,
+                    s.started_at, $12
              FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE a.id = ?2",
+             WHERE a.id = $2",
         )
         .bind(MeasureId::new())
         .bind(assessment)
         .bind(name)
         .bind(side.map_or("", Side::name))
         .bind(value)
-        .bind(standard_error)
+        .bind(*standard_error)
         .bind(n_observations.map(|n| u32::try_from(n).unwrap_or(u32::MAX)))
-        .bind(error_sd)
+        .bind(*error_sd)
         .bind(definition.as_deref().unwrap_or_default())
         .bind(&performance.protocol)
         .bind(reason)
@@ -111,16 +110,16 @@ pub(super) async fn insert_performance(
 
 /// Inserts what a person entered, inside the transaction that stores the measurement.
 pub(super) async fn insert_entered(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     measurement: MeasurementId,
     measures: &Measures,
 ) -> Result<(), StorageError> {
     for (name, measured) in measures.entered() {
-        sqlx::query(
+        query(
             "INSERT INTO measures (id, organisation_id, patient_id, name, value, standard_error, n_observations, error_sd,
                                    measurement_id, measured_at, created_at)
-             SELECT ?1, m.organisation_id, m.patient_id, ?3, ?4, ?5, ?6, ?7, m.id, m.measured_at, m.created_at
-             FROM measurements m WHERE m.id = ?2",
+             SELECT $1, m.organisation_id, m.patient_id, $3, $4, $5, $6, $7, m.id, m.measured_at, m.created_at
+             FROM measurements m WHERE m.id = $2",
         )
         .bind(MeasureId::new())
         .bind(measurement)
@@ -141,7 +140,7 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn measure(&self, access: &Access, id: MeasureId) -> Result<(MeasureRecord, PatientId), StorageError> {
-        let row = sqlx::query("SELECT * FROM measures WHERE organisation_id = ?1 AND id = ?2")
+        let row = query("SELECT * FROM measures WHERE organisation_id = $1 AND id = $2")
             .bind(access.organisation)
             .bind(id)
             .fetch_optional(self.reader())
@@ -160,15 +159,15 @@ impl Store {
         patient: PatientId,
         by: OffsetDateTime,
     ) -> Result<Vec<MeasureRecord>, StorageError> {
-        let rows = sqlx::query(concat!(
-            "SELECT found.* FROM measures found WHERE found.organisation_id = ?1 AND found.id IN (
+        let rows = query(concat!(
+            "SELECT found.* FROM measures found WHERE found.organisation_id = $1 AND found.id IN (
                  SELECT (SELECT m.id FROM measures m
-                         WHERE m.patient_id = ?2 AND m.name = known.name AND m.side = known.side
-                           AND m.definition = known.definition AND m.created_at <= ?3
+                         WHERE m.patient_id = $2 AND m.name = known.name AND m.side = known.side
+                           AND m.definition = known.definition AND m.created_at <= $3
                            AND ",
             not_replaced!(),
             "            ORDER BY m.measured_at DESC, m.id DESC LIMIT 1)
-                 FROM (SELECT DISTINCT name, side, definition FROM measures WHERE patient_id = ?2) known)
+                 FROM (SELECT DISTINCT name, side, definition FROM measures WHERE patient_id = $2) known)
              ORDER BY found.name, found.side, found.definition"
         ))
         .bind(access.organisation)
@@ -192,12 +191,12 @@ impl Store {
         by: OffsetDateTime,
         most: u32,
     ) -> Result<Vec<MeasureRecord>, StorageError> {
-        let rows = sqlx::query(concat!(
+        let rows = query(concat!(
             "SELECT m.* FROM measures m
-             WHERE m.organisation_id = ?1 AND m.patient_id = ?2 AND m.created_at <= ?3 AND m.name = ?4 AND m.side = ?5
-               AND m.definition = ?7 AND ",
+             WHERE m.organisation_id = $1 AND m.patient_id = $2 AND m.created_at <= $3 AND m.name = $4 AND m.side = $5
+               AND m.definition = $7 AND ",
             not_replaced!(),
-            " ORDER BY m.measured_at DESC, m.id DESC LIMIT ?6"
+            " ORDER BY m.measured_at DESC, m.id DESC LIMIT $6"
         ))
         .bind(access.organisation)
         .bind(patient)
@@ -223,12 +222,12 @@ impl Store {
         page: &PageRequest<MeasureId>,
     ) -> Result<Page<MeasureRecord, MeasureId>, StorageError> {
         self.patient(access, patient).await?;
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT m.* FROM measures m
-             WHERE m.organisation_id = ?1 AND m.patient_id = ?2 AND m.id < ?3 AND (?4 IS NULL OR m.name = ?4)
-               AND (?5 IS NULL OR m.session_id = ?5)
-               AND (?7 IS NULL OR m.measured_at >= ?7) AND (?8 IS NULL OR m.measured_at < ?8)
-             ORDER BY m.id DESC LIMIT ?6",
+             WHERE m.organisation_id = $1 AND m.patient_id = $2 AND m.id < $3 AND ($4 IS NULL OR m.name = $4)
+               AND ($5 IS NULL OR m.session_id = $5)
+               AND ($7 IS NULL OR m.measured_at >= $7) AND ($8 IS NULL OR m.measured_at < $8)
+             ORDER BY m.id DESC LIMIT $6",
         )
         .bind(access.organisation)
         .bind(patient)

@@ -1,7 +1,7 @@
-//! SQLite rows and blobs of bytes.
+//! Rows and blobs of bytes: SQLite and a folder, or PostgreSQL and a bucket.
 //!
 //! Every question that is asked of the database is one method of [`Store`], in the file of its subject, with domain
-//! types in and out: whoever asks never sees SQL, so another database can stand behind the same questions.
+//! types in and out: whoever asks never sees SQL, and [`database`] puts SQLite or PostgreSQL behind the same questions.
 //!
 //! A question by a client takes an [`Access`]. What lies outside of it does not exist for the client: the answer is
 //! [`StorageError::NotFound`], never "forbidden", so that nobody learns of another organisation's rows.
@@ -18,6 +18,7 @@ pub mod backup;
 pub mod blobs;
 pub mod clients;
 pub mod clock;
+pub(crate) mod database;
 pub mod entries;
 pub mod error;
 pub mod id;
@@ -30,6 +31,7 @@ pub mod organisations;
 pub mod page;
 pub mod page_sessions;
 pub mod patients;
+mod places;
 pub mod recent;
 pub mod recordings;
 pub(crate) mod row;
@@ -55,34 +57,23 @@ pub use organisations::Organisation;
 pub use page::{Page, PageRequest};
 pub use page_sessions::PageToken;
 pub use patients::{NewPatient, Patient, PatientFilter, Sex};
+pub use places::Places;
 pub use recordings::{NewRecording, RecordingFilter, StoredRecording};
 pub use series::{Parts, SeriesQuery, SeriesSlice};
 pub use sessions::{NewSession, Session, SessionFilter};
 
+use database::{Database, Transaction, query};
 use known_keys::KnownKeys;
-use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{Sqlite, SqlitePool, Transaction};
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 use time::OffsetDateTime;
 
 /// Name of the database file in the data directory.
 const DATABASE_FILE: &str = "surefoot.sqlite";
-/// Connections that read at the same time. More than the cores of a small server gain nothing.
-const READERS: u32 = 8;
-/// How long SQLite waits for another process that holds the database.
-const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
-/// How long a question waits for a free connection before it fails.
-const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(30);
-
-static MIGRATIONS: sqlx::migrate::Migrator = sqlx::migrate!();
-
 /// The database and the blobs of one data directory. A clone is another handle to the same.
 #[derive(Debug, Clone)]
 pub struct Store {
-    writer: SqlitePool,
-    readers: SqlitePool,
+    database: Database,
     blobs: BlobStore,
     clock: Arc<dyn Clock>,
     known_keys: KnownKeys,
@@ -94,7 +85,7 @@ impl Store {
     /// # Errors
     /// When the directory cannot be written, the file is not a database, or a newer version of Surefoot made it.
     pub async fn open(data_dir: &Path) -> Result<Self, StorageError> {
-        Self::open_with_clock(data_dir, Arc::new(SystemClock)).await
+        Self::open_at(&Places::in_directory(data_dir), Arc::new(SystemClock)).await
     }
 
     /// Like [`Store::open`], with a clock of the caller's choice.
@@ -102,19 +93,17 @@ impl Store {
     /// # Errors
     /// See [`Store::open`].
     pub async fn open_with_clock(data_dir: &Path, clock: Arc<dyn Clock>) -> Result<Self, StorageError> {
-        let blobs = BlobStore::open(data_dir).await?;
-        let options = SqliteConnectOptions::new()
-            .filename(data_dir.join(DATABASE_FILE))
-            .create_if_missing(true)
-            .journal_mode(SqliteJournalMode::Wal)
-            .synchronous(SqliteSynchronous::Full)
-            .busy_timeout(BUSY_TIMEOUT)
-            .foreign_keys(true);
-        let pool = || SqlitePoolOptions::new().acquire_timeout(ACQUIRE_TIMEOUT).test_before_acquire(false);
-        let writer = pool().max_connections(1).connect_with(options.clone()).await?;
-        MIGRATIONS.run(&writer).await?;
-        let readers = pool().max_connections(READERS).connect_with(options.pragma("query_only", "ON")).await?;
-        Ok(Self { writer, readers, blobs, clock, known_keys: KnownKeys::default() })
+        Self::open_at(&Places::in_directory(data_dir), clock).await
+    }
+
+    /// Opens a store wherever its rows and blobs are, and brings the schema up to date.
+    ///
+    /// # Errors
+    /// When a place cannot be reached or used, or a newer version of Surefoot made what is there.
+    pub async fn open_at(places: &Places, clock: Arc<dyn Clock>) -> Result<Self, StorageError> {
+        let blobs = places.open_blobs().await?;
+        let database = places.open_database().await?;
+        Ok(Self { database, blobs, clock, known_keys: KnownKeys::default() })
     }
 
     /// The blobs.
@@ -132,25 +121,23 @@ impl Store {
     /// # Errors
     /// When the database fails.
     pub async fn check_ready(&self) -> Result<(), StorageError> {
-        sqlx::query("SELECT 1").execute(&self.readers).await?;
-        self.begin().await?.rollback().await?;
-        Ok(())
+        query("SELECT 1").execute(self.reader()).await?;
+        self.begin().await?.rollback().await
     }
 
     /// Closes every connection after the questions under way are answered.
     pub async fn close(&self) {
-        self.readers.close().await;
-        self.writer.close().await;
+        self.database.close().await;
     }
 
-    /// A transaction that holds the right to write from its beginning: it can wait, but not fail halfway because
-    /// another writer was faster.
-    pub(crate) async fn begin(&self) -> Result<Transaction<'static, Sqlite>, StorageError> {
-        Ok(self.writer.begin_with("BEGIN IMMEDIATE").await?)
+    /// A transaction that may write.
+    pub(crate) async fn begin(&self) -> Result<Transaction, StorageError> {
+        self.database.begin().await
     }
 
-    pub(crate) fn reader(&self) -> &SqlitePool {
-        &self.readers
+    /// Where questions are asked that only read.
+    pub(crate) fn reader(&self) -> &Database {
+        &self.database
     }
 }
 

@@ -1,10 +1,9 @@
 //! Noise models that the service has trained. Written once, together with the end of their job, and never changed.
 
 use super::clock::ms_from_time;
+use super::database::{Row, Transaction, query};
 use super::{Access, JobId, NoiseModelId, Page, PageRequest, StorageError, Store, row};
 use crate::assessment::{NoiseModel, NoiseModelName};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
 
 /// A trained noise model of an organisation.
@@ -22,7 +21,7 @@ pub struct StoredNoiseModel {
     pub created_at: OffsetDateTime,
 }
 
-fn noise_model_from_row(row: &SqliteRow) -> Result<StoredNoiseModel, StorageError> {
+fn noise_model_from_row(row: &Row) -> Result<StoredNoiseModel, StorageError> {
     Ok(StoredNoiseModel {
         id: row.try_get("id")?,
         job_id: row.try_get("job_id")?,
@@ -34,26 +33,27 @@ fn noise_model_from_row(row: &SqliteRow) -> Result<StoredNoiseModel, StorageErro
 
 /// Inserts a model as the next version of its name, inside the transaction that ends its job.
 pub(crate) async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     job_id: JobId,
     model: NoiseModel,
     now: OffsetDateTime,
 ) -> Result<NoiseModelId, StorageError> {
-    let newest: Option<i64> = sqlx::query_scalar(
+    connection.exclusively("versions of noise models").await?;
+    let newest: Option<i64> = query(
         "SELECT max(n.version) FROM noise_models n JOIN jobs j ON j.organisation_id = n.organisation_id
-         WHERE j.id = ?1 AND n.name = ?2",
+         WHERE j.id = $1 AND n.name = $2",
     )
     .bind(job_id)
     .bind(&model.document().name)
-    .fetch_one(&mut *connection)
+    .fetch_value(&mut *connection)
     .await?;
     let version = u32::try_from(newest.unwrap_or(0) + 1)
         .map_err(|_| StorageError::Corrupt("a noise model has more versions than can be counted".into()))?;
     let model = model.with_version(version);
     let id = NoiseModelId::new();
-    sqlx::query(
+    query(
         "INSERT INTO noise_models (id, organisation_id, job_id, name, version, sha256, document, created_at)
-         SELECT ?1, j.organisation_id, j.id, ?3, ?4, ?5, ?6, ?7 FROM jobs j WHERE j.id = ?2",
+         SELECT $1, j.organisation_id, j.id, $3, $4, $5, $6, $7 FROM jobs j WHERE j.id = $2",
     )
     .bind(id)
     .bind(job_id)
@@ -73,7 +73,7 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn noise_model(&self, access: &Access, id: NoiseModelId) -> Result<StoredNoiseModel, StorageError> {
-        let row = sqlx::query("SELECT * FROM noise_models WHERE organisation_id = ?1 AND id = ?2")
+        let row = query("SELECT * FROM noise_models WHERE organisation_id = $1 AND id = $2")
             .bind(access.organisation)
             .bind(id)
             .fetch_optional(self.reader())
@@ -91,8 +91,8 @@ impl Store {
         access: &Access,
         name: &NoiseModelName,
     ) -> Result<StoredNoiseModel, StorageError> {
-        let row = sqlx::query(
-            "SELECT * FROM noise_models WHERE organisation_id = ?1 AND name = ?2 AND (?3 IS NULL OR version = ?3)
+        let row = query(
+            "SELECT * FROM noise_models WHERE organisation_id = $1 AND name = $2 AND ($3 IS NULL OR version = $3)
              ORDER BY version DESC LIMIT 1",
         )
         .bind(access.organisation)
@@ -109,10 +109,8 @@ impl Store {
     /// # Errors
     /// When the database fails.
     pub async fn names_of_noise_models(&self, access: &Access, limit: u32) -> Result<Vec<String>, StorageError> {
-        let names = sqlx::query_scalar(
-            "SELECT DISTINCT name FROM noise_models WHERE organisation_id = ?1 ORDER BY name LIMIT ?2",
-        );
-        Ok(names.bind(access.organisation).bind(limit).fetch_all(self.reader()).await?)
+        let names = query("SELECT DISTINCT name FROM noise_models WHERE organisation_id = $1 ORDER BY name LIMIT $2");
+        Ok(names.bind(access.organisation).bind(limit).fetch_values(self.reader()).await?)
     }
 
     /// The organisation's trained models, newest first.
@@ -124,13 +122,12 @@ impl Store {
         access: &Access,
         page: &PageRequest<NoiseModelId>,
     ) -> Result<Page<StoredNoiseModel, NoiseModelId>, StorageError> {
-        let rows =
-            sqlx::query("SELECT * FROM noise_models WHERE organisation_id = ?1 AND id < ?2 ORDER BY id DESC LIMIT ?3")
-                .bind(access.organisation)
-                .bind(page.cursor())
-                .bind(page.rows())
-                .fetch_all(self.reader())
-                .await?;
+        let rows = query("SELECT * FROM noise_models WHERE organisation_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3")
+            .bind(access.organisation)
+            .bind(page.cursor())
+            .bind(page.rows())
+            .fetch_all(self.reader())
+            .await?;
         let models = rows.iter().map(noise_model_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(models, page, |model| model.id))
     }
@@ -140,9 +137,9 @@ impl Store {
     /// # Errors
     /// `NotFound` when the job's organisation has none of this name and version.
     pub async fn noise_model_of_job(&self, job: JobId, name: &NoiseModelName) -> Result<NoiseModel, StorageError> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT n.* FROM noise_models n JOIN jobs j ON j.organisation_id = n.organisation_id
-             WHERE j.id = ?1 AND n.name = ?2 AND (?3 IS NULL OR n.version = ?3)
+             WHERE j.id = $1 AND n.name = $2 AND ($3 IS NULL OR n.version = $3)
              ORDER BY n.version DESC LIMIT 1",
         )
         .bind(job)

@@ -1,9 +1,8 @@
 //! Organisations: the walls that no question crosses.
 
 use super::clock::ms_from_time;
+use super::database::{Row, Transaction, query};
 use super::{OrganisationId, StorageError, Store, row};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
 
 /// A clinic, a practice, a study.
@@ -17,17 +16,17 @@ pub struct Organisation {
     pub created_at: OffsetDateTime,
 }
 
-fn organisation_from_row(row: &SqliteRow) -> Result<Organisation, StorageError> {
+fn organisation_from_row(row: &Row) -> Result<Organisation, StorageError> {
     Ok(Organisation { id: row.try_get("id")?, name: row.try_get("name")?, created_at: row::time(row, "created_at")? })
 }
 
 pub(super) async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     name: &str,
     now: OffsetDateTime,
 ) -> Result<Organisation, StorageError> {
     let id = OrganisationId::new();
-    let row = sqlx::query("INSERT INTO organisations (id, name, created_at) VALUES (?1, ?2, ?3) RETURNING *")
+    let row = query("INSERT INTO organisations (id, name, created_at) VALUES ($1, $2, $3) RETURNING *")
         .bind(id)
         .bind(name)
         .bind(ms_from_time(now))
@@ -58,7 +57,7 @@ impl Store {
     /// # Errors
     /// When the database fails.
     pub async fn organisations(&self) -> Result<Vec<Organisation>, StorageError> {
-        let rows = sqlx::query("SELECT * FROM organisations ORDER BY name").fetch_all(self.reader()).await?;
+        let rows = query("SELECT * FROM organisations ORDER BY name").fetch_all(self.reader()).await?;
         rows.iter().map(organisation_from_row).collect()
     }
 
@@ -67,7 +66,7 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn organisation_named(&self, name: &str) -> Result<Organisation, StorageError> {
-        let row = sqlx::query("SELECT * FROM organisations WHERE name = ?1")
+        let row = query("SELECT * FROM organisations WHERE name = $1")
             .bind(name)
             .fetch_optional(self.reader())
             .await?

@@ -2,6 +2,7 @@
 
 use super::clients::{self, Client};
 use super::clock::ms_from_time;
+use super::database::query;
 use super::{ClientId, StorageError, Store};
 use rand::TryRng;
 use rand::rngs::SysRng;
@@ -57,20 +58,20 @@ impl Store {
         let token = PageToken::generate()?;
         let now = self.now();
         let mut transaction = self.begin().await?;
-        sqlx::query("DELETE FROM page_sessions WHERE expires_at <= ?1 OR last_used_at <= ?2")
+        query("DELETE FROM page_sessions WHERE expires_at <= $1 OR last_used_at <= $2")
             .bind(ms_from_time(now))
             .bind(ms_from_time(now - LONGEST_PAUSE))
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
-        sqlx::query(
+        query(
             "INSERT INTO page_sessions (token_sha256, client_id, created_at, last_used_at, expires_at)
-             VALUES (?1, ?2, ?3, ?3, ?4)",
+             VALUES ($1, $2, $3, $3, $4)",
         )
         .bind(&token.digest()[..])
         .bind(client)
         .bind(ms_from_time(now))
         .bind(ms_from_time(now + LONGEST_SESSION))
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         Ok(token)
@@ -82,10 +83,10 @@ impl Store {
     /// When the database fails.
     pub async fn client_of_page_session(&self, token: &PageToken) -> Result<Option<Client>, StorageError> {
         let now = self.now();
-        let row = sqlx::query(
+        let row = query(
             "SELECT c.*, p.last_used_at AS page_used_at
              FROM page_sessions p JOIN clients c ON c.id = p.client_id
-             WHERE p.token_sha256 = ?1 AND p.expires_at > ?2 AND p.last_used_at > ?3 AND c.revoked_at IS NULL",
+             WHERE p.token_sha256 = $1 AND p.expires_at > $2 AND p.last_used_at > $3 AND c.revoked_at IS NULL",
         )
         .bind(&token.digest()[..])
         .bind(ms_from_time(now))
@@ -96,10 +97,10 @@ impl Store {
         let used_at: OffsetDateTime = super::row::time(&row, "page_used_at")?;
         if now - used_at >= USE_RESOLUTION {
             let mut transaction = self.begin().await?;
-            sqlx::query("UPDATE page_sessions SET last_used_at = max(last_used_at, ?2) WHERE token_sha256 = ?1")
+            query("UPDATE page_sessions SET last_used_at = $2 WHERE token_sha256 = $1 AND last_used_at < $2")
                 .bind(&token.digest()[..])
                 .bind(ms_from_time(now))
-                .execute(&mut *transaction)
+                .execute(&mut transaction)
                 .await?;
             transaction.commit().await?;
         }
@@ -112,9 +113,9 @@ impl Store {
     /// When the database fails.
     pub async fn end_page_session(&self, token: &PageToken) -> Result<(), StorageError> {
         let mut transaction = self.begin().await?;
-        sqlx::query("DELETE FROM page_sessions WHERE token_sha256 = ?1")
+        query("DELETE FROM page_sessions WHERE token_sha256 = $1")
             .bind(&token.digest()[..])
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
         Ok(transaction.commit().await?)
     }
@@ -160,15 +161,12 @@ mod tests {
     async fn the_database_holds_no_token_and_forgets_sessions_that_are_over() {
         let clinic = Clinic::open().await;
         let token = clinic.store.begin_page_session(clinic.admin.client).await.unwrap();
-        let stored: Vec<u8> = sqlx::query_scalar("SELECT token_sha256 FROM page_sessions")
-            .fetch_one(clinic.store.reader())
-            .await
-            .unwrap();
+        let stored: Vec<u8> =
+            query("SELECT token_sha256 FROM page_sessions").fetch_value(clinic.store.reader()).await.unwrap();
         assert_ne!(hex::encode(stored), token.reveal());
         clinic.clock.advance(LONGEST_PAUSE);
         clinic.store.begin_page_session(clinic.admin.client).await.unwrap();
-        let left: i64 =
-            sqlx::query_scalar("SELECT count(*) FROM page_sessions").fetch_one(clinic.store.reader()).await.unwrap();
+        let left: i64 = query("SELECT count(*) FROM page_sessions").fetch_value(clinic.store.reader()).await.unwrap();
         assert_eq!(left, 1);
     }
 }

@@ -1,10 +1,9 @@
 //! Patients, known by pseudonym only.
 
 use super::clock::ms_from_time;
+use super::database::{Row, query};
 use super::{Access, Page, PageRequest, PatientId, StorageError, Store, row};
 use serde::{Deserialize, Serialize};
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use time::OffsetDateTime;
 use utoipa::ToSchema;
 
@@ -74,12 +73,12 @@ pub struct PatientFilter {
     pub pseudonym_part: Option<String>,
 }
 
-fn patient_from_row(row: &SqliteRow) -> Result<Patient, StorageError> {
+fn patient_from_row(row: &Row) -> Result<Patient, StorageError> {
     let sex: Option<&str> = row.try_get("sex")?;
     Ok(Patient {
         id: row.try_get("id")?,
         pseudonym: row.try_get("pseudonym")?,
-        birth_year: row.try_get("birth_year")?,
+        birth_year: row::optional_small(row, "birth_year")?,
         sex: sex.map(|_| row::word(row, "sex")).transpose()?,
         height_m: row.try_get("height_m")?,
         uses_walking_aid: row.try_get("uses_walking_aid")?,
@@ -94,9 +93,9 @@ impl Store {
     /// `Conflict` with code `pseudonym_taken`.
     pub async fn create_patient(&self, access: &Access, new: &NewPatient) -> Result<Patient, StorageError> {
         let mut transaction = self.begin().await?;
-        let row = sqlx::query(
+        let row = query(
             "INSERT INTO patients (id, organisation_id, pseudonym, birth_year, sex, height_m, uses_walking_aid, created_at)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) RETURNING *",
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8) RETURNING *",
         )
         .bind(PatientId::new())
         .bind(access.organisation)
@@ -106,7 +105,7 @@ impl Store {
         .bind(new.height_m)
         .bind(new.uses_walking_aid)
         .bind(ms_from_time(self.now()))
-        .fetch_one(&mut *transaction)
+        .fetch_one(&mut transaction)
         .await
         .map_err(|error| {
             StorageError::conflict_if_not_unique(error, "pseudonym_taken", || {
@@ -129,17 +128,17 @@ impl Store {
         change: impl FnOnce(&mut Patient) + Send,
     ) -> Result<Patient, StorageError> {
         let mut transaction = self.begin().await?;
-        let row = sqlx::query("SELECT * FROM patients WHERE organisation_id = ?1 AND id = ?2")
+        let row = query("SELECT * FROM patients WHERE organisation_id = $1 AND id = $2")
             .bind(access.organisation)
             .bind(id)
-            .fetch_optional(&mut *transaction)
+            .fetch_optional(&mut transaction)
             .await?
             .ok_or(StorageError::not_found("patient"))?;
         let mut patient = patient_from_row(&row)?;
         change(&mut patient);
-        let row = sqlx::query(
-            "UPDATE patients SET pseudonym = ?3, birth_year = ?4, sex = ?5, height_m = ?6, uses_walking_aid = ?7
-             WHERE organisation_id = ?1 AND id = ?2 RETURNING *",
+        let row = query(
+            "UPDATE patients SET pseudonym = $3, birth_year = $4, sex = $5, height_m = $6, uses_walking_aid = $7
+             WHERE organisation_id = $1 AND id = $2 RETURNING *",
         )
         .bind(access.organisation)
         .bind(id)
@@ -148,7 +147,7 @@ impl Store {
         .bind(patient.sex.map(Sex::name))
         .bind(patient.height_m)
         .bind(patient.uses_walking_aid)
-        .fetch_one(&mut *transaction)
+        .fetch_one(&mut transaction)
         .await
         .map_err(|error| {
             StorageError::conflict_if_not_unique(error, "pseudonym_taken", || {
@@ -164,7 +163,7 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn patient(&self, access: &Access, id: PatientId) -> Result<Patient, StorageError> {
-        let row = sqlx::query("SELECT * FROM patients WHERE organisation_id = ?1 AND id = ?2")
+        let row = query("SELECT * FROM patients WHERE organisation_id = $1 AND id = $2")
             .bind(access.organisation)
             .bind(id)
             .fetch_optional(self.reader())
@@ -183,13 +182,14 @@ impl Store {
         filter: &PatientFilter,
         page: &PageRequest<PatientId>,
     ) -> Result<Page<Patient, PatientId>, StorageError> {
-        let rows = sqlx::query(
+        // A text holds another when it changes as that is taken out.
+        let rows = query(
             "SELECT * FROM patients
-             WHERE organisation_id = ?1
-               AND id < ?2
-               AND (?3 IS NULL OR substr(pseudonym, 1, length(?3)) = ?3)
-               AND (?4 IS NULL OR instr(lower(pseudonym), lower(?4)) > 0)
-             ORDER BY id DESC LIMIT ?5",
+             WHERE organisation_id = $1
+               AND id < $2
+               AND ($3 IS NULL OR substr(pseudonym, 1, length($3)) = $3)
+               AND ($4 IS NULL OR replace(lower(pseudonym), lower($4), '') <> lower(pseudonym))
+             ORDER BY id DESC LIMIT $5",
         )
         .bind(access.organisation)
         .bind(page.cursor())

@@ -1,17 +1,17 @@
 //! What a patient did lately: sessions, their recordings, and what came of each.
 
 use super::clock::ms_from_time;
+use super::database::{Row, dialects, query};
+use super::id::list_of_ids;
 use super::{Access, AssessmentId, PatientId, StorageError, Store, row};
 use crate::assessment::{Performance, Warning};
 use crate::report::TrainedSession;
 use crate::report::fhir::AssessmentOrigin;
 use crate::report::patient_report::{RecentRecording, RecentSession};
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use time::OffsetDateTime;
 use uuid::Uuid;
 
-fn recording_from_row(row: &SqliteRow) -> Result<RecentRecording, StorageError> {
+fn recording_from_row(row: &Row) -> Result<RecentRecording, StorageError> {
     let performance: Option<Performance> = row::optional_json(row, "performance")?;
     let warnings: Option<Vec<Warning>> = row::optional_json(row, "warnings")?;
     Ok(RecentRecording {
@@ -42,21 +42,38 @@ impl Store {
         by: OffsetDateTime,
         most: u32,
     ) -> Result<Vec<RecentSession>, StorageError> {
-        let rows = sqlx::query(
-            "SELECT s.id, s.started_at, s.protocol, r.id AS recording_id,
-                    coalesce(a.performance ->> '$.protocol', r.inspection ->> '$.header.protocol', s.protocol)
-                        AS recording_protocol,
-                    j.state, CASE WHEN j.state = 'failed' THEN j.error ->> '$.sentence' END AS error,
-                    a.id AS assessment_id, a.pipeline, a.performance,
-                    a.quality ->> '$.coverage' AS coverage, a.quality -> '$.warnings' AS warnings
-             FROM (SELECT * FROM sessions WHERE organisation_id = ?1 AND patient_id = ?2 AND created_at <= ?3
-                   ORDER BY started_at DESC, id DESC LIMIT ?4) s
-                  LEFT JOIN recordings r ON r.session_id = s.id AND r.created_at <= ?3
-                  LEFT JOIN jobs j ON j.id = (SELECT max(id) FROM jobs WHERE recording_id = r.id AND queued_at <= ?3)
-                  LEFT JOIN assessments a ON a.id = (SELECT max(id) FROM assessments
-                                                     WHERE recording_id = r.id AND created_at <= ?3)
-             ORDER BY s.started_at DESC, s.id DESC, r.id",
-        )
+        macro_rules! sessions_with {
+            ($in_json:literal) => {
+                concat!(
+                    "SELECT s.id, s.started_at, s.protocol, r.id AS recording_id, j.state, a.id AS assessment_id, a.pipeline,
+                            a.performance, ",
+                    $in_json,
+                    " FROM (SELECT * FROM sessions WHERE organisation_id = $1 AND patient_id = $2 AND created_at <= $3
+                            ORDER BY started_at DESC, id DESC LIMIT $4) s
+                           LEFT JOIN recordings r ON r.session_id = s.id AND r.created_at <= $3
+                           LEFT JOIN jobs j ON j.id = (SELECT id FROM jobs WHERE recording_id = r.id AND queued_at <= $3
+                                                       ORDER BY id DESC LIMIT 1)
+                           LEFT JOIN assessments a ON a.id = (SELECT id FROM assessments
+                                                              WHERE recording_id = r.id AND created_at <= $3
+                                                              ORDER BY id DESC LIMIT 1)
+                      ORDER BY s.started_at DESC, s.id DESC, r.id"
+                )
+            };
+        }
+        let rows = query(dialects! {
+            sqlite: sessions_with!(
+                "coalesce(a.performance ->> '$.protocol', r.inspection ->> '$.header.protocol', s.protocol)
+                     AS recording_protocol,
+                 CASE WHEN j.state = 'failed' THEN j.error ->> '$.sentence' END AS error,
+                 a.quality ->> '$.coverage' AS coverage, a.quality -> '$.warnings' AS warnings"
+            ),
+            postgres: sessions_with!(
+                "coalesce(a.performance::json ->> 'protocol', r.inspection::json #>> '{header,protocol}', s.protocol)
+                     AS recording_protocol,
+                 CASE WHEN j.state = 'failed' THEN j.error::json ->> 'sentence' END AS error,
+                 (a.quality::json ->> 'coverage')::float8 AS coverage, a.quality::json ->> 'warnings' AS warnings"
+            ),
+        })
         .bind(access.organisation)
         .bind(patient)
         .bind(ms_from_time(by))
@@ -70,7 +87,7 @@ impl Store {
                 let (started_at, protocol) = (row::time(row, "started_at")?, row.try_get("protocol")?);
                 sessions.push(RecentSession { id, started_at, protocol, recordings: Vec::new() });
             }
-            if row.try_get::<Option<Uuid>, _>("recording_id")?.is_some()
+            if row.try_get::<Option<Uuid>>("recording_id")?.is_some()
                 && let Some(session) = sessions.last_mut()
             {
                 session.recordings.push(recording_from_row(row)?);
@@ -89,17 +106,34 @@ impl Store {
         patient: PatientId,
         [from, by]: [OffsetDateTime; 2],
     ) -> Result<Vec<TrainedSession>, StorageError> {
-        let rows = sqlx::query(
-            "SELECT s.id, s.started_at,
-                    coalesce(a.performance ->> '$.protocol', r.inspection ->> '$.header.protocol', s.protocol) AS protocol,
-                    CASE WHEN a.performance ->> '$.status' = 'measured'
-                         THEN json_array_length(a.performance, '$.repetitions') END AS repetitions
-             FROM sessions s JOIN recordings r ON r.session_id = s.id AND r.created_at <= ?4
-                  LEFT JOIN assessments a ON a.id = (SELECT max(id) FROM assessments
-                                                     WHERE recording_id = r.id AND created_at <= ?4)
-             WHERE s.organisation_id = ?1 AND s.patient_id = ?2 AND s.started_at BETWEEN ?3 AND ?4 AND s.created_at <= ?4
-             ORDER BY s.started_at, s.id, r.id",
-        )
+        macro_rules! trained_with {
+            ($in_json:literal) => {
+                concat!(
+                    "SELECT s.id, s.started_at, ",
+                    $in_json,
+                    " FROM sessions s JOIN recordings r ON r.session_id = s.id AND r.created_at <= $4
+                           LEFT JOIN assessments a ON a.id = (SELECT id FROM assessments
+                                                              WHERE recording_id = r.id AND created_at <= $4
+                                                              ORDER BY id DESC LIMIT 1)
+                      WHERE s.organisation_id = $1 AND s.patient_id = $2 AND s.started_at BETWEEN $3 AND $4
+                        AND s.created_at <= $4
+                      ORDER BY s.started_at, s.id, r.id"
+                )
+            };
+        }
+        let rows = query(dialects! {
+            sqlite: trained_with!(
+                "coalesce(a.performance ->> '$.protocol', r.inspection ->> '$.header.protocol', s.protocol) AS protocol,
+                 CASE WHEN a.performance ->> '$.status' = 'measured'
+                      THEN json_array_length(a.performance, '$.repetitions') END AS repetitions"
+            ),
+            postgres: trained_with!(
+                "coalesce(a.performance::json ->> 'protocol', r.inspection::json #>> '{header,protocol}', s.protocol)
+                     AS protocol,
+                 CASE WHEN a.performance::json ->> 'status' = 'measured'
+                      THEN json_array_length(a.performance::json -> 'repetitions')::bigint END AS repetitions"
+            ),
+        })
         .bind(access.organisation)
         .bind(patient)
         .bind(ms_from_time(from))
@@ -115,7 +149,7 @@ impl Store {
             }
             let protocol: Option<String> = row.try_get("protocol")?;
             if let Some((_, session)) = sessions.last_mut() {
-                session.exercises.push((protocol.unwrap_or_default(), row.try_get("repetitions")?));
+                session.exercises.push((protocol.unwrap_or_default(), row::optional_small(row, "repetitions")?));
             }
         }
         Ok(sessions.into_iter().map(|(_, session)| session).collect())
@@ -130,18 +164,25 @@ impl Store {
         access: &Access,
         ids: &[AssessmentId],
     ) -> Result<Vec<AssessmentOrigin>, StorageError> {
-        // As hexadecimal digits, which is how JSON can carry what the column holds as bytes.
-        let ids: Vec<String> = ids.iter().map(|id| id.0.simple().to_string()).collect();
-        let list = serde_json::to_string(&ids).map_err(|error| StorageError::Corrupt(error.to_string()))?;
-        let rows = sqlx::query(
-            "SELECT id, recording_id, created_at, provenance FROM assessments
-             WHERE organisation_id = ?1 AND id IN (SELECT unhex(value) FROM json_each(?2)) ORDER BY id",
-        )
+        macro_rules! origins {
+            ($ids:literal) => {
+                concat!(
+                    "SELECT id, recording_id, created_at, provenance FROM assessments
+                     WHERE organisation_id = $1 AND id IN (",
+                    $ids,
+                    ") ORDER BY id"
+                )
+            };
+        }
+        let rows = query(dialects! {
+            sqlite: origins!("SELECT unhex(value) FROM json_each($2)"),
+            postgres: origins!("SELECT value::uuid FROM json_array_elements_text($2::json)"),
+        })
         .bind(access.organisation)
-        .bind(list)
+        .bind(list_of_ids(ids.iter().map(|id| id.0)))
         .fetch_all(self.reader())
         .await?;
-        let origin = |row: &SqliteRow| {
+        let origin = |row: &Row| {
             Ok(AssessmentOrigin {
                 assessment_id: row.try_get("id")?,
                 recording_id: row.try_get("recording_id")?,

@@ -1,12 +1,11 @@
 //! Recordings: one upload in a session. The bytes are a blob; the row says which, and what is in it.
 
 use super::clock::ms_from_time;
+use super::database::{Row, Transaction, dialects, query};
 use super::{
     Access, ClientId, Page, PageRequest, PatientId, RecordingId, SessionId, StorageError, Store, StoredBlob, row,
 };
 use crate::recording::decode::Inspection;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use time::OffsetDateTime;
 
 /// A recording to be made; its bytes are already stored.
@@ -48,7 +47,7 @@ pub struct RecordingFilter {
     pub patient_id: Option<PatientId>,
 }
 
-fn recording_from_row(row: &SqliteRow) -> Result<StoredRecording, StorageError> {
+fn recording_from_row(row: &Row) -> Result<StoredRecording, StorageError> {
     Ok(StoredRecording {
         id: row.try_get("id")?,
         session_id: row.try_get("session_id")?,
@@ -66,27 +65,27 @@ fn recording_from_row(row: &SqliteRow) -> Result<StoredRecording, StorageError> 
 
 /// Inserts a recording inside the caller's transaction, so that its job can stand or fall with it.
 pub(crate) async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     access: &Access,
     new: &NewRecording,
     now: OffsetDateTime,
 ) -> Result<StoredRecording, StorageError> {
-    let patient_id: PatientId = sqlx::query_scalar(
-        "SELECT patient_id FROM sessions WHERE organisation_id = ?1 AND (?2 IS NULL OR created_by = ?2) AND id = ?3",
+    let patient_id: PatientId = query(
+        "SELECT patient_id FROM sessions WHERE organisation_id = $1 AND ($2 IS NULL OR created_by = $2) AND id = $3",
     )
     .bind(access.organisation)
     .bind(access.only_sessions_of())
     .bind(new.session_id)
-    .fetch_optional(&mut *connection)
+    .fetch_optional_value(&mut *connection)
     .await?
     .ok_or(StorageError::not_found("session"))?;
     let id = RecordingId::new();
     let size = i64::try_from(new.blob.size_bytes)
         .map_err(|_| StorageError::Corrupt(format!("a blob of {} bytes", new.blob.size_bytes)))?;
-    let row = sqlx::query(
+    let row = query(
         "INSERT INTO recordings (id, organisation_id, session_id, created_by, size_bytes, sha256, blob_key, inspection,
                                  created_at)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) RETURNING *, ?10 AS patient_id",
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9) RETURNING *, $10 AS patient_id",
     )
     .bind(id)
     .bind(access.organisation)
@@ -109,9 +108,9 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn recording(&self, access: &Access, id: RecordingId) -> Result<StoredRecording, StorageError> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
-             WHERE r.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2) AND r.id = ?3",
+             WHERE r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2) AND r.id = $3",
         )
         .bind(access.organisation)
         .bind(access.only_sessions_of())
@@ -137,20 +136,20 @@ impl Store {
             ($session:literal) => {
                 concat!(
                     "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
-                     WHERE r.organisation_id = ?1 AND (?2 IS NULL OR s.created_by = ?2)
-                       AND r.id < ?3
-                       AND (?5 IS NULL OR s.patient_id = ?5)
+                     WHERE r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)
+                       AND r.id < $3
+                       AND ($5 IS NULL OR s.patient_id = $5)
                        AND ",
                     $session,
-                    " ORDER BY r.id DESC LIMIT ?6"
+                    " ORDER BY r.id DESC LIMIT $6"
                 )
             };
         }
         let question = match filter.session_id {
-            Some(_) => recordings_where!("r.session_id = ?4"),
-            None => recordings_where!("?4 IS NULL"),
+            Some(_) => recordings_where!("r.session_id = $4"),
+            None => recordings_where!("$4 IS NULL"),
         };
-        let rows = sqlx::query(question)
+        let rows = query(question)
             .bind(access.organisation)
             .bind(access.only_sessions_of())
             .bind(page.cursor())
@@ -168,10 +167,12 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is no such recording.
     pub async fn declared_protocols(&self, id: RecordingId) -> Result<[Option<String>; 2], StorageError> {
-        let row = sqlx::query(
-            "SELECT r.inspection ->> '$.header.protocol' AS of_header, s.protocol AS of_session
-             FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = ?1",
-        )
+        let row = query(dialects! {
+            sqlite: "SELECT r.inspection ->> '$.header.protocol' AS of_header, s.protocol AS of_session
+                     FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = $1",
+            postgres: "SELECT r.inspection::json #>> '{header,protocol}' AS of_header, s.protocol AS of_session
+                       FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = $1",
+        })
         .bind(id)
         .fetch_optional(self.reader())
         .await?
@@ -184,13 +185,12 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn recording_to_assess(&self, id: RecordingId) -> Result<StoredRecording, StorageError> {
-        let row = sqlx::query(
-            "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = ?1",
-        )
-        .bind(id)
-        .fetch_optional(self.reader())
-        .await?
-        .ok_or(StorageError::not_found("recording"))?;
+        let row =
+            query("SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = $1")
+                .bind(id)
+                .fetch_optional(self.reader())
+                .await?
+                .ok_or(StorageError::not_found("recording"))?;
         recording_from_row(&row)
     }
 }

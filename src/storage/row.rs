@@ -2,10 +2,9 @@
 
 use super::StorageError;
 use super::clock::time_from_ms;
+use super::database::Row;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use time::OffsetDateTime;
 
 fn damaged(column: &str, reason: impl std::fmt::Display) -> StorageError {
@@ -13,43 +12,50 @@ fn damaged(column: &str, reason: impl std::fmt::Display) -> StorageError {
 }
 
 /// A wall-clock time.
-pub(crate) fn time(row: &SqliteRow, column: &str) -> Result<OffsetDateTime, StorageError> {
+pub(crate) fn time(row: &Row, column: &str) -> Result<OffsetDateTime, StorageError> {
     let ms: i64 = row.try_get(column)?;
     time_from_ms(ms).ok_or_else(|| damaged(column, format!("{ms} ms is beyond the calendar")))
 }
 
 /// A wall-clock time that may be absent.
-pub(crate) fn optional_time(row: &SqliteRow, column: &str) -> Result<Option<OffsetDateTime>, StorageError> {
+pub(crate) fn optional_time(row: &Row, column: &str) -> Result<Option<OffsetDateTime>, StorageError> {
     let ms: Option<i64> = row.try_get(column)?;
     ms.map(|ms| time_from_ms(ms).ok_or_else(|| damaged(column, format!("{ms} ms is beyond the calendar")))).transpose()
 }
 
 /// A count.
-pub(crate) fn count(row: &SqliteRow, column: &str) -> Result<u64, StorageError> {
+pub(crate) fn count(row: &Row, column: &str) -> Result<u64, StorageError> {
     let number: i64 = row.try_get(column)?;
     u64::try_from(number).map_err(|_| damaged(column, format!("{number} is negative")))
 }
 
-/// A small count.
-pub(crate) fn small_count(row: &SqliteRow, column: &str) -> Result<u32, StorageError> {
+/// A number of a narrow type: columns are 64 bits wide.
+pub(crate) fn small<T: TryFrom<i64>>(row: &Row, column: &str) -> Result<T, StorageError> {
     let number: i64 = row.try_get(column)?;
-    u32::try_from(number).map_err(|_| damaged(column, format!("{number} is out of range")))
+    T::try_from(number).map_err(|_| damaged(column, format!("{number} is out of range")))
+}
+
+/// A number of a narrow type that may be absent.
+pub(crate) fn optional_small<T: TryFrom<i64>>(row: &Row, column: &str) -> Result<Option<T>, StorageError> {
+    let number: Option<i64> = row.try_get(column)?;
+    let narrow = |number| T::try_from(number).map_err(|_| damaged(column, format!("{number} is out of range")));
+    number.map(narrow).transpose()
 }
 
 /// A structured value.
-pub(crate) fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> Result<T, StorageError> {
+pub(crate) fn json<T: DeserializeOwned>(row: &Row, column: &str) -> Result<T, StorageError> {
     let text: &str = row.try_get(column)?;
     serde_json::from_str(text).map_err(|error| damaged(column, error))
 }
 
 /// A structured value that may be absent.
-pub(crate) fn optional_json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> Result<Option<T>, StorageError> {
+pub(crate) fn optional_json<T: DeserializeOwned>(row: &Row, column: &str) -> Result<Option<T>, StorageError> {
     let text: Option<&str> = row.try_get(column)?;
     text.map(|text| serde_json::from_str(text).map_err(|error| damaged(column, error))).transpose()
 }
 
 /// A value that is one word in the database, as it is in JSON.
-pub(crate) fn word<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> Result<T, StorageError> {
+pub(crate) fn word<T: DeserializeOwned>(row: &Row, column: &str) -> Result<T, StorageError> {
     let text: &str = row.try_get(column)?;
     word_from_text(text).map_err(|error| damaged(column, error))
 }

@@ -1,9 +1,9 @@
 //! Sessions: one sitting of a patient at home.
 
 use super::clock::ms_from_time;
+use super::database::{Row, dialects, query};
+use super::id::list_of_ids;
 use super::{Access, ClientId, Page, PageRequest, PatientId, SessionId, StorageError, Store, row};
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use std::collections::HashMap;
 use time::OffsetDateTime;
 
@@ -56,7 +56,7 @@ pub struct SessionFilter {
     pub protocol: Option<String>,
 }
 
-fn session_from_row(row: &SqliteRow) -> Result<Session, StorageError> {
+fn session_from_row(row: &Row) -> Result<Session, StorageError> {
     Ok(Session {
         id: row.try_get("id")?,
         patient_id: row.try_get("patient_id")?,
@@ -76,11 +76,11 @@ impl Store {
     /// `NotFound` when the organisation has no such patient.
     pub async fn create_session(&self, access: &Access, new: &NewSession) -> Result<Session, StorageError> {
         let mut transaction = self.begin().await?;
-        let row = sqlx::query(
+        let row = query(
             "INSERT INTO sessions (id, organisation_id, patient_id, created_by, started_at, protocol, notes, noise_model,
                                    created_at)
-             SELECT ?1, p.organisation_id, p.id, ?4, ?5, ?6, ?7, ?8, ?9 FROM patients p
-             WHERE p.organisation_id = ?2 AND p.id = ?3 RETURNING *",
+             SELECT $1, p.organisation_id, p.id, $4, $5, $6, $7, $8, $9 FROM patients p
+             WHERE p.organisation_id = $2 AND p.id = $3 RETURNING *",
         )
         .bind(SessionId::new())
         .bind(access.organisation)
@@ -91,7 +91,7 @@ impl Store {
         .bind(&new.notes)
         .bind(&new.noise_model)
         .bind(ms_from_time(self.now()))
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?
         .ok_or(StorageError::not_found("patient"))?;
         transaction.commit().await?;
@@ -103,15 +103,14 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn session(&self, access: &Access, id: SessionId) -> Result<Session, StorageError> {
-        let row = sqlx::query(
-            "SELECT * FROM sessions WHERE organisation_id = ?1 AND (?2 IS NULL OR created_by = ?2) AND id = ?3",
-        )
-        .bind(access.organisation)
-        .bind(access.only_sessions_of())
-        .bind(id)
-        .fetch_optional(self.reader())
-        .await?
-        .ok_or(StorageError::not_found("session"))?;
+        let row =
+            query("SELECT * FROM sessions WHERE organisation_id = $1 AND ($2 IS NULL OR created_by = $2) AND id = $3")
+                .bind(access.organisation)
+                .bind(access.only_sessions_of())
+                .bind(id)
+                .fetch_optional(self.reader())
+                .await?
+                .ok_or(StorageError::not_found("session"))?;
         session_from_row(&row)
     }
 
@@ -124,15 +123,22 @@ impl Store {
         access: &Access,
         patients: &[PatientId],
     ) -> Result<HashMap<PatientId, OffsetDateTime>, StorageError> {
-        // As hexadecimal digits, which is how JSON can carry what the column holds as bytes.
-        let ids: Vec<String> = patients.iter().map(|id| id.0.simple().to_string()).collect();
-        let list = serde_json::to_string(&ids).map_err(|error| StorageError::Corrupt(error.to_string()))?;
-        let rows = sqlx::query(
-            "SELECT patient_id, max(started_at) AS started_at FROM sessions
-             WHERE organisation_id = ?1 AND patient_id IN (SELECT unhex(value) FROM json_each(?2)) GROUP BY patient_id",
-        )
+        macro_rules! last_sessions {
+            ($patients:literal) => {
+                concat!(
+                    "SELECT patient_id, max(started_at) AS started_at FROM sessions
+                     WHERE organisation_id = $1 AND patient_id IN (",
+                    $patients,
+                    ") GROUP BY patient_id"
+                )
+            };
+        }
+        let rows = query(dialects! {
+            sqlite: last_sessions!("SELECT unhex(value) FROM json_each($2)"),
+            postgres: last_sessions!("SELECT value::uuid FROM json_array_elements_text($2::json)"),
+        })
         .bind(access.organisation)
-        .bind(list)
+        .bind(list_of_ids(patients.iter().map(|id| id.0)))
         .fetch_all(self.reader())
         .await?;
         rows.iter().map(|row| Ok((row.try_get("patient_id")?, row::time(row, "started_at")?))).collect()
@@ -153,23 +159,23 @@ impl Store {
             ($indexed:literal) => {
                 concat!(
                     "SELECT * FROM sessions
-                     WHERE organisation_id = ?1
-                       AND id < ?3
-                       AND (?5 IS NULL OR started_at >= ?5)
-                       AND (?6 IS NULL OR started_at < ?6)
-                       AND (?7 IS NULL OR protocol = ?7)
+                     WHERE organisation_id = $1
+                       AND id < $3
+                       AND ($5 IS NULL OR started_at >= $5)
+                       AND ($6 IS NULL OR started_at < $6)
+                       AND ($7 IS NULL OR protocol = $7)
                        AND ",
                     $indexed,
-                    " ORDER BY id DESC LIMIT ?8"
+                    " ORDER BY id DESC LIMIT $8"
                 )
             };
         }
         let question = match (filter.patient_id, access.only_sessions_of()) {
-            (Some(_), _) => sessions_where!("patient_id = ?4 AND (?2 IS NULL OR created_by = ?2)"),
-            (None, Some(_)) => sessions_where!("created_by = ?2 AND ?4 IS NULL"),
-            (None, None) => sessions_where!("?2 IS NULL AND ?4 IS NULL"),
+            (Some(_), _) => sessions_where!("patient_id = $4 AND ($2 IS NULL OR created_by = $2)"),
+            (None, Some(_)) => sessions_where!("created_by = $2 AND $4 IS NULL"),
+            (None, None) => sessions_where!("$2 IS NULL AND $4 IS NULL"),
         };
-        let rows = sqlx::query(question)
+        let rows = query(question)
             .bind(access.organisation)
             .bind(access.only_sessions_of())
             .bind(page.cursor())

@@ -3,13 +3,13 @@
 use super::*;
 use crate::recording::Header;
 use crate::recording::decode::{Format, Inspection};
-use sqlx::{ConnectOptions, Connection};
 use tempfile::TempDir;
 use time::macros::datetime;
 
 /// A store with one organisation, an admin and a device in it, and one session of the admin's.
 pub(super) struct Clinic {
-    pub(super) dir: TempDir,
+    _dir: TempDir,
+    places: Places,
     pub(super) clock: ManualClock,
     pub(super) store: Store,
     pub(super) admin: Access,
@@ -22,13 +22,14 @@ impl Clinic {
     pub(super) async fn open() -> Self {
         let dir = tempfile::tempdir().unwrap();
         let clock = ManualClock::at(datetime!(2026-11-22 08:00 UTC));
-        let store = Store::open_with_clock(dir.path(), Arc::new(clock.clone())).await.unwrap();
+        let places = empty_places(dir.path()).await;
+        let store = Store::open_at(&places, Arc::new(clock.clone())).await.unwrap();
         let organisation = store.create_organisation("clinic").await.unwrap().id;
         let admin = store.create_client(organisation, Role::Admin, "admin").await.unwrap().0.access();
         let device = store.create_client(organisation, Role::Device, "camera").await.unwrap().0.access();
         let patient = store.create_patient(&admin, &new_patient("P-1")).await.unwrap().id;
         let session = store.create_session(&admin, &new_session(patient)).await.unwrap().id;
-        Self { dir, clock, store, admin, device, patient, session }
+        Self { _dir: dir, places, clock, store, admin, device, patient, session }
     }
 
     /// Stores a recording as the upload does, without a job.
@@ -48,6 +49,33 @@ impl Clinic {
         let organisation = self.store.create_organisation("elsewhere").await.unwrap().id;
         self.store.create_client(organisation, Role::Admin, "stranger").await.unwrap().0.access()
     }
+}
+
+/// An empty place: a directory, and, where the variable `SUREFOOT_TEST_POSTGRES` names a server, a new database there.
+async fn empty_places(dir: &Path) -> Places {
+    let mut places = Places::in_directory(dir);
+    if cfg!(feature = "scaleout")
+        && let Ok(server) = std::env::var("SUREFOOT_TEST_POSTGRES")
+    {
+        places.database_url = Some(new_postgres_database(&server).await);
+    }
+    places
+}
+
+#[cfg(feature = "scaleout")]
+async fn new_postgres_database(server: &str) -> String {
+    use sqlx::{Connection, Executor};
+
+    let name = format!("surefoot_test_{}", uuid::Uuid::now_v7().simple());
+    let mut connection = sqlx::PgConnection::connect(server).await.unwrap();
+    connection.execute(sqlx::AssertSqlSafe(format!("CREATE DATABASE {name}"))).await.unwrap();
+    let (address, _) = server.rsplit_once('/').unwrap();
+    format!("{address}/{name}")
+}
+
+#[cfg(not(feature = "scaleout"))]
+async fn new_postgres_database(_: &str) -> String {
+    unreachable!("asked for with the feature alone")
 }
 
 fn new_patient(pseudonym: &str) -> NewPatient {
@@ -86,33 +114,9 @@ fn is_absent<T: std::fmt::Debug>(answer: Result<T, StorageError>, what: &str) {
 async fn a_store_opens_again_with_what_was_committed() {
     let clinic = Clinic::open().await;
     clinic.store.close().await;
-    let store = Store::open(clinic.dir.path()).await.unwrap();
+    let store = Store::open_at(&clinic.places, Arc::new(clinic.clock.clone())).await.unwrap();
     store.check_ready().await.unwrap();
     assert_eq!(store.session(&clinic.admin, clinic.session).await.unwrap().patient_id, clinic.patient);
-}
-
-#[tokio::test]
-async fn the_database_is_durable_strict_and_keeps_references() {
-    let clinic = Clinic::open().await;
-    let mut writer = clinic.store.begin().await.unwrap();
-    let pragma = async |question: &'static str, transaction: &mut Transaction<'static, Sqlite>| {
-        let row = sqlx::query(question).fetch_one(&mut **transaction).await.unwrap();
-        sqlx::Row::try_get::<i64, _>(&row, 0).unwrap()
-    };
-    assert_eq!(pragma("PRAGMA synchronous", &mut writer).await, 2, "FULL");
-    assert_eq!(pragma("PRAGMA foreign_keys", &mut writer).await, 1);
-    assert_eq!(pragma("PRAGMA busy_timeout", &mut writer).await, 5000);
-    let mode: String = sqlx::query_scalar("PRAGMA journal_mode").fetch_one(&mut *writer).await.unwrap();
-    assert_eq!(mode, "wal");
-    let lax: Vec<String> = sqlx::query_scalar(
-        "SELECT name FROM pragma_table_list WHERE schema = 'main' AND NOT strict
-           AND name NOT LIKE 'sqlite_%' AND name NOT LIKE '\\_sqlx%' ESCAPE '\\'",
-    )
-    .fetch_all(&mut *writer)
-    .await
-    .unwrap();
-    assert_eq!(lax, [""; 0]);
-    assert!(sqlx::query("DELETE FROM patients").execute(&mut *writer).await.is_err());
 }
 
 #[tokio::test]
@@ -268,31 +272,4 @@ async fn a_device_sees_its_own_sessions_and_what_hangs_on_them_only() {
     assert_eq!(list(&clinic.admin, RecordingFilter { session_id: Some(own), ..all }).await, [recording.id]);
     let of_patient = RecordingFilter { patient_id: Some(clinic.patient), ..all };
     assert_eq!(list(&clinic.admin, of_patient).await, [recording.id, theirs.id]);
-}
-
-#[tokio::test]
-async fn results_of_tests_from_before_there_were_measures_become_measures() {
-    let folder = tempfile::tempdir().unwrap();
-    let options = SqliteConnectOptions::new().filename(folder.path().join(DATABASE_FILE)).create_if_missing(true);
-    let mut connection = options.connect().await.unwrap();
-    let before = MIGRATIONS.iter().filter(|migration| migration.version < 5).cloned().collect();
-    sqlx::migrate::Migrator::with_migrations(before).run(&mut connection).await.unwrap();
-    for statement in [
-        "INSERT INTO organisations VALUES (zeroblob(16), 'o', 0)",
-        "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at)
-         VALUES (zeroblob(16), zeroblob(16), 'admin', 'a', zeroblob(32), 0)",
-        "INSERT INTO patients (id, organisation_id, pseudonym, created_at) VALUES (zeroblob(16), zeroblob(16), 'p', 0)",
-        r#"INSERT INTO measurements VALUES (randomblob(16), zeroblob(16), zeroblob(16), zeroblob(16), 5,
-           '{"usual_speed_mps": {"value": 1.5, "standard_error": 0.1}, "timed_up_and_go_s": {"value": 9}}', 7)"#,
-    ] {
-        sqlx::query(statement).execute(&mut connection).await.unwrap();
-    }
-    connection.close().await.unwrap();
-
-    let store = Store::open(folder.path()).await.unwrap();
-    let nobody = uuid::Uuid::nil();
-    let access = Access { organisation: OrganisationId(nobody), client: ClientId(nobody), own_sessions_only: false };
-    let found = store.newest_measures(&access, PatientId(nobody), datetime!(2026-01-01 0:00 UTC)).await.unwrap();
-    let values: Vec<_> = found.iter().map(|m| (m.name.as_str(), m.value, m.standard_error)).collect();
-    assert_eq!(values, [("timed_up_and_go_s", 9.0, None), ("usual_speed_mps", 1.5, Some(0.1))]);
 }

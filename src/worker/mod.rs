@@ -5,6 +5,7 @@
 //! operator who shuts the process down, or because the job has become somebody else's.
 
 mod assessing;
+pub mod canary;
 
 pub use assessing::{AttemptError, assess_recording};
 
@@ -15,13 +16,14 @@ use crate::assessment::{Assessment, CalibrationChoice, JointAngleSettings, Noise
 use crate::pipeline::{Inputs, PatientCalibration, PipelineError};
 use crate::progress::{Monitor, Step};
 use crate::protocol;
-use crate::queue::{Failure, Finish, Job, JobError, Queue, Renewal, Trained};
+use crate::queue::{Delivery, Failure, Finish, Job, JobError, Queue, Renewal, Trained};
 use crate::recording::decode::Limits;
 use crate::storage::{BlobReader, JobId, RecordingId, StorageError, StoredRecording};
 use std::fmt;
 use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::sync::OnceCell;
 use tokio::task::{JoinHandle, JoinSet, spawn_blocking};
 use tokio::time::MissedTickBehavior;
 use tokio_util::sync::CancellationToken;
@@ -34,6 +36,13 @@ const POLL: Duration = Duration::from_secs(1);
 
 /// Metric: time from the request for a job to the beginning of an attempt, seconds.
 const JOB_WAIT: &str = "surefoot_job_wait_seconds";
+
+/// Metric: attempts that ended, by pipeline and whether there was a result.
+const ATTEMPTS: &str = "surefoot_job_attempts_total";
+/// Metric: time of each step of an attempt, seconds, by pipeline.
+const STEP: &str = "surefoot_job_step_seconds";
+/// Metric: 1 when this process got a canary wrong and takes no jobs.
+const CANARY_FAILED: &str = "surefoot_canary_failed";
 
 /// The computation of one assessment, on a blocking thread.
 pub type Assess = dyn Fn(BlobReader, &StoredRecording, &Settings, &Inputs, &Monitor) -> Result<Assessment, AttemptError>
@@ -72,15 +81,40 @@ impl fmt::Debug for Worker {
     }
 }
 
-/// Starts `count` workers. Each ends after `shutdown`; a job that is under way then goes back to the queue.
-pub fn spawn(queue: &Queue, count: usize, limits: &Limits, shutdown: &CancellationToken) -> JoinSet<()> {
+/// Starts `count` workers. Each ends after `shutdown`; a job that is under way then goes back to the queue. With `has_canary` they
+/// first see whether this build gets recordings right whose truth is known, and end when it does not.
+pub fn spawn(
+    queue: &Queue,
+    count: usize,
+    limits: &Limits,
+    has_canary: bool,
+    shutdown: &CancellationToken,
+) -> JoinSet<()> {
+    let is_fit = Arc::new(OnceCell::new());
     let mut workers = JoinSet::new();
     for number in 1..=count {
         let name = format!("{}-{number}", std::process::id());
         let worker = Worker::new(queue.clone(), name, limits.clone(), shutdown.clone());
-        workers.spawn(async move { worker.run().await });
+        let is_fit = is_fit.clone();
+        workers.spawn(async move {
+            if !has_canary || *is_fit.get_or_init(passes_canaries).await {
+                worker.run().await;
+            }
+        });
     }
     workers
+}
+
+async fn passes_canaries() -> bool {
+    let sung = spawn_blocking(canary::sing).await.unwrap_or_else(|panic| Err(format!("a canary panicked: {panic}")));
+    metrics::gauge!(CANARY_FAILED).set(f64::from(u8::from(sung.is_err())));
+    match sung {
+        Ok(()) => true,
+        Err(why) => {
+            tracing::error!(why, "this process gets a recording wrong whose truth is known; it takes no jobs");
+            false
+        }
+    }
 }
 
 impl Worker {
@@ -116,17 +150,24 @@ impl Worker {
 
     /// Runs jobs until the shutdown.
     pub async fn run(&self) {
+        let mut deliveries = self.queue.deliveries();
+        let mut delivery = None;
         while !self.shutdown.is_cancelled() {
             // Registered before the look: a job that comes in between wakes this worker at once.
             let mut woken = pin!(self.queue.woken());
             woken.as_mut().enable();
-            match self.run_next().await {
+            let ran = self.run_next().await;
+            if let Some(delivery) = delivery.take() {
+                Delivery::done(delivery).await;
+            }
+            match ran {
                 Ok(Ran::Job(_)) => continue,
                 Ok(Ran::QueueEmpty) => {}
                 Err(error) => tracing::error!(worker = %self.name, %error, "the queue could not be asked for a job"),
             }
             tokio::select! {
                 () = woken => {}
+                news = deliveries.next() => delivery = Some(news),
                 () = tokio::time::sleep(POLL) => {}
                 () = self.shutdown.cancelled() => {}
             }
@@ -143,9 +184,18 @@ impl Worker {
             metrics::histogram!(JOB_WAIT).record((started_at - job.queued_at).as_seconds_f64());
         }
         let monitor = Monitor::default();
-        match self.attempt(&job, &monitor).await {
+        let pipeline = job.settings.pipeline();
+        let outcome = self.attempt(&job, &monitor).await;
+        let result = if outcome.is_ok() { "result" } else { "none" };
+        match outcome {
             Ok(outcome) => self.save(&job, outcome, &monitor).await?,
             Err(error) => self.give_up(&job, error).await?,
+        }
+        // The end of the last step.
+        let _ = monitor.begin(Step::Saving, 1);
+        metrics::counter!(ATTEMPTS, "pipeline" => pipeline, "outcome" => result).increment(1);
+        for (step, seconds) in monitor.durations() {
+            metrics::histogram!(STEP, "pipeline" => pipeline, "step" => step.name()).record(seconds);
         }
         Ok(Ran::Job(job.id))
     }

@@ -1,6 +1,6 @@
 //! Claims, leases and fences, without a worker.
 
-use crate::support::{Bench, assessment, open, side_door};
+use crate::support::{Bench, assessment, open, rows_are_elsewhere, side_door};
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 use surefoot::assessment::Settings;
@@ -21,6 +21,9 @@ async fn assessments(bench: &Bench) -> usize {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn ten_thousand_jobs_are_each_claimed_once_by_many_workers_of_two_processes() {
+    if rows_are_elsewhere() {
+        return;
+    }
     const JOBS: usize = 10_000;
     let bench = Bench::new().await;
     bench.submit(b"abc").await;
@@ -53,7 +56,7 @@ async fn ten_thousand_jobs_are_each_claimed_once_by_many_workers_of_two_processe
     let claimed: Vec<_> = workers.join_all().await.into_iter().flatten().collect();
     assert_eq!(claimed.len(), JOBS);
     assert_eq!(claimed.iter().collect::<HashSet<_>>().len(), JOBS);
-    assert_eq!(bench.queue.counts().await.unwrap(), [(JobState::Done, JOBS as u64)]);
+    assert_eq!(bench.counts().await, [(JobState::Done, JOBS as u64)]);
 }
 
 #[tokio::test]
@@ -73,6 +76,9 @@ async fn jobs_are_claimed_in_the_order_in_which_they_came() {
 
 #[tokio::test]
 async fn a_recording_and_its_job_are_stored_together_or_not_at_all() {
+    if rows_are_elsewhere() {
+        return;
+    }
     let bench = Bench::new().await;
     let rows = side_door(bench.dir.path()).await;
     sqlx::raw_sql("CREATE TRIGGER fault BEFORE INSERT ON jobs BEGIN SELECT RAISE(ABORT, 'injected'); END")
@@ -146,6 +152,9 @@ async fn a_job_whose_workers_fall_silent_is_given_up_after_its_last_attempt_with
 
 #[tokio::test]
 async fn a_result_and_the_end_of_its_job_are_one_transaction() {
+    if rows_are_elsewhere() {
+        return;
+    }
     let bench = Bench::new().await;
     let job = bench.submit(b"abc").await;
     bench.queue.claim("w").await.unwrap().unwrap();
@@ -257,7 +266,7 @@ async fn jobs_are_listed_newest_first_in_pages_and_by_state_and_recording() {
     assert_eq!(list(running, PageRequest::first(9)).await.0, [first.id]);
     let of_second = JobFilter { recording_id: Some(second.recording_id), ..all };
     assert_eq!(list(of_second, PageRequest::first(9)).await.0, [third.id, second.id]);
-    let states: BTreeSet<_> = bench.queue.counts().await.unwrap().into_iter().map(|(s, n)| (s.name(), n)).collect();
+    let states: BTreeSet<_> = bench.counts().await.into_iter().map(|(s, n)| (s.name(), n)).collect();
     assert_eq!(states, BTreeSet::from([("queued", 2), ("running", 1)]));
 }
 
@@ -275,7 +284,7 @@ async fn an_upload_that_is_sent_twice_is_stored_once_and_answered_twice() {
     let Submission::Stored(first) = submit(&bench.access, "a").await else { panic!("not stored") };
     assert_eq!(submit(&bench.access, "a").await, Submission::Replayed(first));
     assert_eq!(submit(&bench.access, "b").await, Submission::KeyReused);
-    assert_eq!(bench.queue.counts().await.unwrap(), [(JobState::Queued, 1)]);
+    assert_eq!(bench.counts().await, [(JobState::Queued, 1)]);
     let (other, _) = bench.queue.store().create_client(bench.access.organisation, Role::Admin, "other").await.unwrap();
     assert!(matches!(submit(&other.access(), "b").await, Submission::Stored(_)), "another client's key");
     bench.clock.advance(Duration::hours(24));
@@ -300,6 +309,9 @@ async fn of_many_equal_uploads_at_the_same_time_one_is_stored() {
 
 #[tokio::test]
 async fn an_upload_whose_answer_cannot_be_kept_is_not_stored_and_its_key_is_free() {
+    if rows_are_elsewhere() {
+        return;
+    }
     let bench = Bench::new().await;
     let (new, settings) = (bench.new_recording(b"abc").await, Settings::default());
     let rows = side_door(bench.dir.path()).await;
@@ -309,7 +321,7 @@ async fn an_upload_whose_answer_cannot_be_kept_is_not_stored_and_its_key_is_free
         .await
         .unwrap();
     assert!(matches!(submit().await, Err(StorageError::Database(_))));
-    assert_eq!(bench.queue.counts().await.unwrap(), []);
+    assert_eq!(bench.counts().await, []);
     sqlx::raw_sql("DROP TRIGGER fault").execute(&rows).await.unwrap();
     assert!(matches!(submit().await.unwrap(), Submission::Stored(_)));
 }

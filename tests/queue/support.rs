@@ -7,12 +7,12 @@ use std::time::Duration;
 use surefoot::assessment::{Assessment, Provenance, Quality, Series, Settings};
 use surefoot::pipeline::Inputs;
 use surefoot::progress::Monitor;
-use surefoot::queue::{Job, Queue, QueueSettings};
+use surefoot::queue::{Job, JobState, Queue, QueueSettings};
 use surefoot::recording::Header;
 use surefoot::recording::decode::{Format, Inspection, Limits};
 use surefoot::storage::{
-    Access, BlobReader, JobId, ManualClock, NewPatient, NewRecording, NewSession, RecordingId, Role, SessionId, Store,
-    StoredRecording,
+    Access, BlobReader, JobId, ManualClock, NewPatient, NewRecording, NewSession, Places, RecordingId, Role, SessionId,
+    Store, StoredRecording,
 };
 use surefoot::worker::{Assess, AttemptError, Worker};
 use tempfile::TempDir;
@@ -88,6 +88,11 @@ impl Bench {
             .with_heartbeat(SILENT)
     }
 
+    /// How many jobs are in each state that has any.
+    pub async fn counts(&self) -> Vec<(JobState, u64)> {
+        self.queue.counts().await.unwrap().into_iter().filter(|(_, count)| *count > 0).collect()
+    }
+
     /// Lets the longest pause between two attempts, and every lease, pass.
     pub fn pass_time(&self) {
         self.clock.advance(time::Duration::minutes(10));
@@ -100,10 +105,46 @@ fn temporary_directory() -> TempDir {
     if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap()
 }
 
-/// Opens a data directory as a process does that has just started.
+/// Opens a data directory as a process does that has just started. Where the variable `SUREFOOT_TEST_POSTGRES` names a server,
+/// the rows are in a database of the directory's own there.
 pub async fn open(dir: &Path, clock: &ManualClock) -> Queue {
-    let store = Store::open_with_clock(dir, Arc::new(clock.clone())).await.unwrap();
+    let mut places = Places::in_directory(dir);
+    if let Some(server) = postgres_server() {
+        places.database_url = Some(postgres_database(&server, dir).await);
+    }
+    let store = Store::open_at(&places, Arc::new(clock.clone())).await.unwrap();
     Queue::new(store, QueueSettings::default())
+}
+
+fn postgres_server() -> Option<String> {
+    std::env::var("SUREFOOT_TEST_POSTGRES").ok().filter(|_| cfg!(feature = "scaleout"))
+}
+
+/// True where a test that looks into SQLite's file has nothing to look into.
+pub fn rows_are_elsewhere() -> bool {
+    let elsewhere = postgres_server().is_some();
+    if elsewhere {
+        println!("skipped: the rows are in PostgreSQL, and this test looks into SQLite's file");
+    }
+    elsewhere
+}
+
+#[cfg(feature = "scaleout")]
+async fn postgres_database(server: &str, dir: &Path) -> String {
+    use sqlx::{Connection, Executor};
+
+    let of_directory: String = dir.to_string_lossy().chars().filter(char::is_ascii_alphanumeric).collect();
+    let name = format!("surefoot_test_{}_{}", std::process::id(), of_directory.to_lowercase());
+    let mut connection = sqlx::PgConnection::connect(server).await.unwrap();
+    // The second process finds it made.
+    let _ = connection.execute(sqlx::AssertSqlSafe(format!("CREATE DATABASE {name}"))).await;
+    let (address, _) = server.rsplit_once('/').unwrap();
+    format!("{address}/{name}")
+}
+
+#[cfg(not(feature = "scaleout"))]
+async fn postgres_database(_: &str, _: &Path) -> String {
+    unreachable!("asked for with the feature alone")
 }
 
 fn inspection() -> Inspection {

@@ -1,6 +1,6 @@
 //! Trainings: their model and the end of their job are one.
 
-use crate::support::{Bench, side_door};
+use crate::support::{Bench, rows_are_elsewhere, side_door};
 use surefoot::assessment::noise_model::nite_table1;
 use surefoot::assessment::{NoiseModel, NoiseModelSettings, Settings};
 use surefoot::queue::{Job, JobState, Trained};
@@ -69,6 +69,9 @@ async fn every_training_of_a_name_is_a_further_version_and_the_digest_is_that_of
 
 #[tokio::test]
 async fn a_model_that_cannot_be_stored_leaves_its_job_running() {
+    if rows_are_elsewhere() {
+        return;
+    }
     let bench = Bench::new().await;
     let job = enqueue(&bench, "ward-3").await;
     bench.queue.claim("w").await.unwrap().unwrap();

@@ -76,6 +76,7 @@ async fn upload_recording(
     body: Body,
 ) -> Result<Response, ApiError> {
     let session = state.store.session(&caller.access, path.id).await?;
+    state.queue.room(&caller.access).await?.map_err(ApiError::Crowded)?;
     let announced = Announced::from_headers(&headers)?;
     let arrived = arrival::receive(&state, &announced, body).await?;
     announced.check_digest(arrived.sealed.sha256())?;

@@ -86,6 +86,22 @@ impl BlobStore {
         Ok(Self { parts, folder: None, store })
     }
 
+    /// Blobs in an S3 bucket; parts wait in a folder of the data directory until they are complete.
+    ///
+    /// # Errors
+    /// When the address is not one of a bucket, the environment does not say how to reach it, or the folder cannot be made.
+    #[cfg(feature = "scaleout")]
+    pub async fn in_bucket(data_dir: &Path, url: &str) -> Result<Self, StorageError> {
+        use object_store::aws::AmazonS3Builder;
+        use object_store::prefix::PrefixStore;
+
+        let opening = || store_error("opening the bucket");
+        let bucket = AmazonS3Builder::from_env().with_url(url).build().map_err(opening())?;
+        let prefix = url.split_once("://").and_then(|(_, rest)| rest.split_once('/')).map_or("", |(_, prefix)| prefix);
+        let prefix = Key::parse(prefix.trim_end_matches('/')).map_err(|error| opening()(error.into()))?;
+        Self::in_object_store(data_dir.join(PART_FOLDER), Arc::new(PrefixStore::new(bucket, prefix))).await
+    }
+
     /// Begins an upload.
     ///
     /// # Errors

@@ -7,10 +7,9 @@
 pub(super) mod codec;
 mod decimation;
 
+use super::database::{self, Row, Transaction, dialects};
 use super::{Access, AssessmentId, StorageError, Store};
 use crate::assessment::{Assessment, Series};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 use std::ops::Range;
 use tokio::task::spawn_blocking;
 
@@ -103,14 +102,14 @@ fn chunk_ranges(n: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// Inserts the chunks inside the caller's transaction.
 pub(super) async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction,
     id: AssessmentId,
     encoded: &EncodedSeries,
 ) -> Result<(), StorageError> {
     for (chunk, time) in encoded.time.iter().enumerate() {
-        sqlx::query(
+        database::query(
             "INSERT INTO time_chunks (assessment_id, chunk, n_samples, first_ns, last_ns, time)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+             VALUES ($1, $2, $3, $4, $5, $6)",
         )
         .bind(id)
         .bind(chunk as i64)
@@ -122,10 +121,10 @@ pub(super) async fn insert(
         .await?;
     }
     for (channel, chunk, series) in &encoded.series {
-        sqlx::query(
+        database::query(
             "INSERT INTO series_chunks
                  (assessment_id, channel, chunk, value_min, value_max, value, low, high, flags)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
         )
         .bind(id)
         .bind(channel)
@@ -162,9 +161,9 @@ impl Store {
                 .map(|name| known.iter().position(|k| k == name).ok_or(StorageError::not_found("channel")))
                 .collect::<Result<Vec<_>, _>>()?,
         };
-        let time_rows = sqlx::query(
+        let time_rows = database::query(
             "SELECT chunk, n_samples, time FROM time_chunks
-             WHERE assessment_id = ?1 AND (?2 IS NULL OR last_ns >= ?2) AND (?3 IS NULL OR first_ns <= ?3)
+             WHERE assessment_id = $1 AND ($2 IS NULL OR last_ns >= $2) AND ($3 IS NULL OR first_ns <= $3)
              ORDER BY chunk",
         )
         .bind(id)
@@ -172,17 +171,27 @@ impl Store {
         .bind(query.to_ns)
         .fetch_all(self.reader())
         .await?;
-        let first_chunk = time_rows.first().map(|row| row.try_get::<i64, _>("chunk")).transpose()?;
-        let last_chunk = time_rows.last().map(|row| row.try_get::<i64, _>("chunk")).transpose()?;
+        let first_chunk = time_rows.first().map(|row| row.try_get::<i64>("chunk")).transpose()?;
+        let last_chunk = time_rows.last().map(|row| row.try_get::<i64>("chunk")).transpose()?;
         let list = serde_json::to_string(&wanted).map_err(|error| StorageError::Corrupt(error.to_string()))?;
-        let series_rows = sqlx::query(
-            "SELECT channel, chunk, value_min, value_max, value,
-                    CASE WHEN ?5 THEN low END AS low, CASE WHEN ?5 THEN high END AS high,
-                    CASE WHEN ?6 THEN flags END AS flags
-             FROM series_chunks
-             WHERE assessment_id = ?1 AND channel IN (SELECT value FROM json_each(?2)) AND chunk BETWEEN ?3 AND ?4
-             ORDER BY channel, chunk",
-        )
+        macro_rules! chunks_of {
+            ($channels:literal) => {
+                concat!(
+                    "SELECT channel, chunk, value_min, value_max, value,
+                            CASE WHEN $5 THEN low END AS low, CASE WHEN $5 THEN high END AS high,
+                            CASE WHEN $6 THEN flags END AS flags
+                     FROM series_chunks
+                     WHERE assessment_id = $1 AND channel IN (",
+                    $channels,
+                    ") AND chunk BETWEEN $3 AND $4
+                     ORDER BY channel, chunk"
+                )
+            };
+        }
+        let series_rows = database::query(dialects! {
+            sqlite: chunks_of!("SELECT value FROM json_each($2)"),
+            postgres: chunks_of!("SELECT value::bigint FROM json_array_elements_text($2::json)"),
+        })
         .bind(id)
         .bind(list)
         .bind(first_chunk.unwrap_or(0))
@@ -207,15 +216,15 @@ struct Assembly {
 
 fn slice_from_rows(
     names: &[(usize, String)],
-    time_rows: &[SqliteRow],
-    series_rows: &[SqliteRow],
+    time_rows: &[Row],
+    series_rows: &[Row],
     query: &SeriesQuery,
 ) -> Result<SeriesSlice, StorageError> {
     let mut decoder = codec::Decoder::new()?;
     let mut lengths = Vec::with_capacity(time_rows.len());
     let mut time_ns = Vec::with_capacity(time_rows.len() * CHUNK_SAMPLES);
     for row in time_rows {
-        let n = usize::try_from(row.try_get::<i64, _>("n_samples")?).unwrap_or(usize::MAX);
+        let n = usize::try_from(row.try_get::<i64>("n_samples")?).unwrap_or(usize::MAX);
         decoder.decode_time(row.try_get("time")?, n, &mut time_ns)?;
         lengths.push(n);
     }
@@ -235,7 +244,7 @@ fn slice_from_rows(
         }
         let mut one = Assembly { series: Series { channel: name.clone(), ..empty() }, value_range: None };
         for (i, (row, n)) in rows.iter().zip(&lengths).enumerate() {
-            if row.try_get::<i64, _>("chunk")? != first_chunk + i as i64 {
+            if row.try_get::<i64>("chunk")? != first_chunk + i as i64 {
                 return Err(StorageError::Corrupt(format!("channel `{name}` lacks a chunk")));
             }
             one.append(row, *n, query.parts, &mut decoder)?;
@@ -270,13 +279,7 @@ fn slice_from_rows(
 }
 
 impl Assembly {
-    fn append(
-        &mut self,
-        row: &SqliteRow,
-        n: usize,
-        parts: Parts,
-        decoder: &mut codec::Decoder,
-    ) -> Result<(), StorageError> {
+    fn append(&mut self, row: &Row, n: usize, parts: Parts, decoder: &mut codec::Decoder) -> Result<(), StorageError> {
         decoder.decode_f32(row.try_get("value")?, n, &mut self.series.value)?;
         if parts.interval {
             decoder.decode_f32(row.try_get("low")?, n, &mut self.series.low)?;
@@ -294,7 +297,7 @@ impl Assembly {
     }
 }
 
-fn channel_of(row: &SqliteRow) -> i64 {
+fn channel_of(row: &Row) -> i64 {
     // A missing column cannot be: the question names it. -1 would be caught as a channel that lacks chunks.
     row.try_get("channel").unwrap_or(-1)
 }

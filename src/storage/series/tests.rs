@@ -27,13 +27,13 @@ async fn store_assessment(clinic: &Clinic, assessment: Assessment) -> Assessment
     let encoded = EncodedAssessment::encode(&assessment).unwrap();
     let job = JobId::new();
     let mut transaction = clinic.store.begin().await.unwrap();
-    sqlx::query(
+    database::query(
         "INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, settings, queued_at)
-         SELECT ?1, organisation_id, id, 'done', 1, '', 0 FROM recordings WHERE id = ?2",
+         SELECT $1, organisation_id, id, 'done', 1, '', 0 FROM recordings WHERE id = $2",
     )
     .bind(job)
     .bind(recording.id)
-    .execute(&mut *transaction)
+    .execute(&mut transaction)
     .await
     .unwrap();
     let now = clinic.store.now();
@@ -199,7 +199,7 @@ async fn unknown_channels_and_missing_chunks_are_told_apart() {
     let unknown = clinic.store.series_of_assessment(&clinic.admin, id, &query).await;
     assert!(matches!(unknown, Err(StorageError::NotFound { what: "channel" })), "{unknown:?}");
     let mut transaction = clinic.store.begin().await.unwrap();
-    sqlx::query("DELETE FROM series_chunks").execute(&mut *transaction).await.unwrap();
+    database::query("DELETE FROM series_chunks").execute(&mut transaction).await.unwrap();
     transaction.commit().await.unwrap();
     let missing = clinic.store.series_of_assessment(&clinic.admin, id, &SeriesQuery::default()).await;
     assert!(matches!(missing, Err(StorageError::Corrupt(_))), "{missing:?}");

@@ -1,0 +1,26 @@
+//! A database of PostgreSQL.
+
+use super::Database;
+use crate::storage::StorageError;
+use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
+use std::str::FromStr;
+use std::time::Duration;
+
+/// Connections of one process. A hundred processes stay below what a server takes with a pooler before it.
+const CONNECTIONS: u32 = 16;
+/// How long a question waits for a free connection before it fails.
+const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(30);
+
+static MIGRATIONS: sqlx::migrate::Migrator = sqlx::migrate!("migrations/postgres");
+
+pub(super) async fn connect(url: &str) -> Result<Database, StorageError> {
+    // What was committed survives a power cut of the server, whatever its default is.
+    let options = PgConnectOptions::from_str(url)?
+        .application_name("surefoot")
+        .options([("synchronous_commit", "on"), ("default_transaction_isolation", "read committed")]);
+    let pool = PgPoolOptions::new().max_connections(CONNECTIONS).acquire_timeout(ACQUIRE_TIMEOUT);
+    let pool = pool.connect_with(options).await?;
+    // Processes that start together take turns: the migrator holds a lock of the server.
+    MIGRATIONS.run(&pool).await?;
+    Ok(Database::Postgres(pool))
+}

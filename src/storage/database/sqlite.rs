@@ -1,0 +1,92 @@
+//! A file of SQLite.
+
+use super::Database;
+use crate::storage::StorageError;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
+use std::path::Path;
+use std::time::Duration;
+
+/// Connections that read at the same time. More than the cores of a small server gain nothing.
+const READERS: u32 = 8;
+/// How long SQLite waits for another process that holds the database.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long a question waits for a free connection before it fails.
+const ACQUIRE_TIMEOUT: Duration = Duration::from_secs(30);
+
+static MIGRATIONS: sqlx::migrate::Migrator = sqlx::migrate!();
+
+pub(super) async fn open(path: &Path) -> Result<Database, StorageError> {
+    let options = SqliteConnectOptions::new()
+        .filename(path)
+        .create_if_missing(true)
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .busy_timeout(BUSY_TIMEOUT)
+        .foreign_keys(true);
+    let pool = || SqlitePoolOptions::new().acquire_timeout(ACQUIRE_TIMEOUT).test_before_acquire(false);
+    let writer = pool().max_connections(1).connect_with(options.clone()).await?;
+    MIGRATIONS.run(&writer).await?;
+    let readers = pool().max_connections(READERS).connect_with(options.pragma("query_only", "ON")).await?;
+    Ok(Database::Sqlite { writer, readers })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::storage::{Access, ClientId, DATABASE_FILE, OrganisationId, PatientId, Store};
+    use sqlx::{ConnectOptions, Connection, SqliteConnection};
+    use time::macros::datetime;
+
+    #[tokio::test]
+    async fn the_database_is_durable_strict_and_keeps_references() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        store.create_organisation("clinic").await.unwrap();
+        let mut writer = store.database.sqlite_writer().unwrap().acquire().await.unwrap();
+        let pragma = async |question: &'static str, connection: &mut SqliteConnection| {
+            sqlx::query_scalar::<_, i64>(question).fetch_one(connection).await.unwrap()
+        };
+        assert_eq!(pragma("PRAGMA synchronous", &mut writer).await, 2, "FULL");
+        assert_eq!(pragma("PRAGMA foreign_keys", &mut writer).await, 1);
+        assert_eq!(pragma("PRAGMA busy_timeout", &mut writer).await, 5000);
+        let mode: String = sqlx::query_scalar("PRAGMA journal_mode").fetch_one(&mut *writer).await.unwrap();
+        assert_eq!(mode, "wal");
+        let lax: Vec<String> = sqlx::query_scalar(
+            "SELECT name FROM pragma_table_list WHERE schema = 'main' AND NOT strict
+               AND name NOT LIKE 'sqlite_%' AND name NOT LIKE '\\_sqlx%' ESCAPE '\\'",
+        )
+        .fetch_all(&mut *writer)
+        .await
+        .unwrap();
+        assert_eq!(lax, [""; 0]);
+        assert!(sqlx::query("INSERT INTO patients (id, organisation_id, pseudonym, created_at) VALUES (zeroblob(16), zeroblob(16), 'p', 0)").execute(&mut *writer).await.is_err());
+    }
+
+    #[tokio::test]
+    async fn results_of_tests_from_before_there_were_measures_become_measures() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = SqliteConnectOptions::new().filename(folder.path().join(DATABASE_FILE)).create_if_missing(true);
+        let mut connection = options.connect().await.unwrap();
+        let before = MIGRATIONS.iter().filter(|migration| migration.version < 5).cloned().collect();
+        sqlx::migrate::Migrator::with_migrations(before).run(&mut connection).await.unwrap();
+        for statement in [
+            "INSERT INTO organisations VALUES (zeroblob(16), 'o', 0)",
+            "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at)
+             VALUES (zeroblob(16), zeroblob(16), 'admin', 'a', zeroblob(32), 0)",
+            "INSERT INTO patients (id, organisation_id, pseudonym, created_at) VALUES (zeroblob(16), zeroblob(16), 'p', 0)",
+            r#"INSERT INTO measurements VALUES (randomblob(16), zeroblob(16), zeroblob(16), zeroblob(16), 5,
+               '{"usual_speed_mps": {"value": 1.5, "standard_error": 0.1}, "timed_up_and_go_s": {"value": 9}}', 7)"#,
+        ] {
+            sqlx::query(statement).execute(&mut connection).await.unwrap();
+        }
+        connection.close().await.unwrap();
+
+        let store = Store::open(folder.path()).await.unwrap();
+        let nobody = uuid::Uuid::nil();
+        let access =
+            Access { organisation: OrganisationId(nobody), client: ClientId(nobody), own_sessions_only: false };
+        let found = store.newest_measures(&access, PatientId(nobody), datetime!(2026-01-01 0:00 UTC)).await.unwrap();
+        let values: Vec<_> = found.iter().map(|m| (m.name.as_str(), m.value, m.standard_error)).collect();
+        assert_eq!(values, [("timed_up_and_go_s", 9.0, None), ("usual_speed_mps", 1.5, Some(0.1))]);
+    }
+}

@@ -1,0 +1,9 @@
+//! Real processes of the binary, killed, starved and set against each other.
+
+mod disk_full;
+mod kills;
+#[cfg(feature = "scaleout")]
+mod scaleout;
+#[cfg(feature = "scaleout")]
+mod servers;
+mod support;
