@@ -76,7 +76,7 @@ fn leg_pose() -> Result<(), String> {
     };
     let ankle = [axis("left_ankle_x_m")?, axis("left_ankle_y_m")?, axis("left_ankle_z_m")?];
     let distance = |k: usize| {
-        let truth = simulation.truth(k).legs[crate::body::Side::Left].ankle;
+        let truth = simulation.truth(k).legs[0].ankle;
         (0..3).map(|i| (f64::from(ankle[i][k]) - truth[i]).powi(2)).sum::<f64>().sqrt()
     };
     let distances: Vec<f64> = (0..assessment.time_ns.len()).map(distance).filter(|d| d.is_finite()).collect();

@@ -98,6 +98,7 @@ async fn nothing_is_lost_doubled_or_stuck_however_often_processes_are_killed() {
     let n_results: Vec<usize> = results.iter().map(BTreeSet::len).collect();
     assert!(n_results.iter().all(|n| *n <= 1), "results of the same bytes: {n_results:?}");
     drop(service);
+    assert_eq!(std::fs::read_dir(data.join("parts")).unwrap().count(), 0, "parts of uploads that ended early");
 
     let doctor = surefoot(&["doctor", "--data-dir"]).arg(&data).output().unwrap();
     assert!(doctor.status.success(), "{}", String::from_utf8_lossy(&doctor.stdout));
