@@ -15,6 +15,7 @@ mod overlay;
 pub mod serve;
 pub mod simulate;
 pub mod simulate_walker;
+pub mod telemetry;
 pub mod train;
 pub mod worker;
 

@@ -148,6 +148,8 @@ impl Queue {
     }
 
     fn wake_worker(&self, id: JobId) {
+        // Inside of the request's span: so a job is found in the log by the request that asked for it.
+        tracing::info!(job = %id, "a job waits");
         self.wake.notify_one();
         self.messenger.tell_waiting(id);
     }

@@ -27,6 +27,7 @@ use tokio::sync::OnceCell;
 use tokio::task::{JoinHandle, JoinSet, spawn_blocking};
 use tokio::time::MissedTickBehavior;
 use tokio_util::sync::CancellationToken;
+use tracing::Instrument;
 
 /// How often progress is written and the request to stop is seen.
 const HEARTBEAT: Duration = Duration::from_millis(250);
@@ -183,13 +184,19 @@ impl Worker {
         if let Some(started_at) = job.started_at {
             metrics::histogram!(JOB_WAIT).record((started_at - job.queued_at).as_seconds_f64());
         }
-        let monitor = Monitor::default();
         let pipeline = job.settings.pipeline();
-        let outcome = self.attempt(&job, &monitor).await;
+        let span = tracing::info_span!("job", job = %job.id, attempt = job.attempt, pipeline);
+        self.run_claimed(&job, pipeline).instrument(span).await?;
+        Ok(Ran::Job(job.id))
+    }
+
+    async fn run_claimed(&self, job: &Job, pipeline: &'static str) -> Result<(), StorageError> {
+        let monitor = Monitor::default();
+        let outcome = self.attempt(job, &monitor).await;
         let result = if outcome.is_ok() { "result" } else { "none" };
         match outcome {
-            Ok(outcome) => self.save(&job, outcome, &monitor).await?,
-            Err(error) => self.give_up(&job, error).await?,
+            Ok(outcome) => self.save(job, outcome, &monitor).await?,
+            Err(error) => self.give_up(job, error).await?,
         }
         // The end of the last step.
         let _ = monitor.begin(Step::Saving, 1);
@@ -197,7 +204,7 @@ impl Worker {
         for (step, seconds) in monitor.durations() {
             metrics::histogram!(STEP, "pipeline" => pipeline, "step" => step.name()).record(seconds);
         }
-        Ok(Ran::Job(job.id))
+        Ok(())
     }
 
     async fn attempt(&self, job: &Job, monitor: &Monitor) -> Result<Outcome, AttemptError> {

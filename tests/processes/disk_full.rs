@@ -64,5 +64,5 @@ async fn a_full_disk_is_told_and_costs_nothing_that_was_stored() {
         let jobs = app.list(&format!("/v1/jobs?recording_id={id}")).await;
         assert_eq!((jobs.len(), jobs[0]["state"].as_str().unwrap()), (1, "done"), "{jobs:#?}");
     }
-    assert_eq!(app.list("/v1/recordings").await.len(), stored.len());
+    assert_eq!(app.list(&format!("/v1/sessions/{session}/recordings")).await.len(), stored.len());
 }

@@ -78,7 +78,7 @@ async fn nothing_is_lost_doubled_or_stuck_however_often_processes_are_killed() {
     }
     app.until_all_jobs_are_over().await;
 
-    let recordings = app.list("/v1/recordings").await;
+    let recordings = app.list(&format!("/v1/sessions/{session}/recordings")).await;
     let stored: BTreeSet<&str> = recordings.iter().map(|one| one["id"].as_str().unwrap()).collect();
     let promised: BTreeSet<&str> = acknowledged.values().map(|(_, id)| id.as_str()).collect();
     assert_eq!(stored, promised, "recordings that are stored, and those that were acknowledged");
