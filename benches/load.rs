@@ -22,8 +22,7 @@ const LOOK: Duration = Duration::from_secs(10);
 async fn main() {
     let (sessions, soak_s) = (number("SUREFOOT_SESSIONS", 1000), number("SUREFOOT_SOAK_S", 0));
     let folder = tempfile::tempdir().expect("a folder");
-    let settings =
-        [("SUREFOOT_WORKERS", "2"), ("SUREFOOT_RATE_LIMIT_PER_MINUTE", "1000000"), ("SUREFOOT_CANARY", "false")];
+    let settings = [("SUREFOOT_WORKERS", "2"), ("SUREFOOT_REQUESTS_PER_MINUTE", "0"), ("SUREFOOT_CANARY", "false")];
     let service = Service::start(&folder.path().join("data"), &settings);
     let app = App::new(&service, service.admin_key.as_ref().expect("the first start"));
     let session = app.session("P-1").await;

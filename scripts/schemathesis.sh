@@ -36,6 +36,8 @@ finish() {
 trap finish EXIT
 trap 'exit 130' INT TERM
 
+# Made-up requests come faster than any client's.
+export SUREFOOT_REQUESTS_PER_MINUTE=0 SUREFOOT_ANONYMOUS_REQUESTS_PER_MINUTE=0
 "$binary" serve --json --data-dir "$work/data" --listen 127.0.0.1:0 >"$work/started" 2>"$work/log" &
 server=$!
 attempts=0

@@ -168,6 +168,7 @@ pub struct AssessmentsQuery {
 ///
 /// Newest first, in pages.
 #[utoipa::path(get, path = "/v1/assessments", tag = "assessments", operation_id = "list_assessments",
+    security(("api_key" = ["device"])),
     params(AssessmentsQuery),
     responses((status = 200, description = "One page", body = Page<AssessmentItem>)))]
 async fn list_assessments(
@@ -195,6 +196,7 @@ async fn list_assessments(
 ///
 /// Summary, quality and provenance; the samples are at `/v1/assessments/{id}/series`.
 #[utoipa::path(get, path = "/v1/assessments/{id}", tag = "assessments", operation_id = "read_assessment",
+    security(("api_key" = ["device"])),
     params(AssessmentPath),
     responses((status = 200, description = "The assessment", body = AssessmentResponse),
               (status = 304, description = "Not changed since the ETag in If-None-Match")))]

@@ -7,8 +7,9 @@
 //! addresses. A cookie never authorises a request that changes something, so that no other site can make a browser do so.
 
 use super::error::ApiError;
+use super::oidc::Oidc;
 use super::state::AppState;
-use crate::storage::{Access, ApiKey, Client, PageToken, Role};
+use crate::storage::{Access, ApiKey, Client, KeyHolder, PageToken, Role};
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Method, header};
@@ -39,20 +40,54 @@ impl FromRequestParts<AppState> for Caller {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
-        const HOW: &str = "This request needs an API key: send the header `Authorization: Bearer surefoot_…`.";
-        const UNKNOWN: &str = "This API key is unknown or was revoked. Ask an administrator for a new one.";
-        let Some(header) = parts.headers.get(header::AUTHORIZATION) else {
-            return of_reading_page(parts, state).await?.ok_or(ApiError::Unauthenticated(HOW));
-        };
-        let header = header.to_str().map_err(|_| ApiError::Unauthenticated(HOW))?;
-        let (scheme, key) = header.split_once(' ').ok_or(ApiError::Unauthenticated(HOW))?;
-        if !scheme.eq_ignore_ascii_case("bearer") {
-            return Err(ApiError::Unauthenticated(HOW));
+        match identify(parts, state).await {
+            Ok(caller) => state.rates.count_client(caller.client.id).map(|()| caller),
+            Err(refusal @ (ApiError::Unauthenticated(_) | ApiError::KeyExpired)) => {
+                // What brings nothing has been counted on its way here.
+                if [header::AUTHORIZATION, header::COOKIE].iter().any(|name| parts.headers.contains_key(name)) {
+                    state.rates.count_anonymous(parts, &state.config)?;
+                }
+                Err(refusal)
+            }
+            Err(other) => Err(other),
         }
-        let client = state.store.client_of_key(&ApiKey::from_text(key.trim())).await?;
-        let client = client.ok_or(ApiError::Unauthenticated(UNKNOWN))?;
-        Ok(Self { access: client.access(), client })
     }
+}
+
+/// Whose key, or whose cookie, a request brings.
+async fn identify(parts: &Parts, state: &AppState) -> Result<Caller, ApiError> {
+    const HOW: &str = "This request needs an API key: send the header `Authorization: Bearer surefoot_…`.";
+    const UNKNOWN: &str = "This API key is unknown or was revoked. Ask an administrator for a new one.";
+    let Some(header) = parts.headers.get(header::AUTHORIZATION) else {
+        return of_reading_page(parts, state).await?.ok_or(ApiError::Unauthenticated(HOW));
+    };
+    let header = header.to_str().map_err(|_| ApiError::Unauthenticated(HOW))?;
+    let (scheme, key) = header.split_once(' ').ok_or(ApiError::Unauthenticated(HOW))?;
+    if !scheme.eq_ignore_ascii_case("bearer") {
+        return Err(ApiError::Unauthenticated(HOW));
+    }
+    if let Some(oidc) = state.oidc.as_deref().filter(|_| is_token(key.trim())) {
+        return of_token(oidc, key.trim(), state).await;
+    }
+    match state.store.holder_of_key(&ApiKey::from_text(key.trim())).await? {
+        KeyHolder::Valid(client) => Ok(Caller { access: client.access(), client }),
+        KeyHolder::Expired => Err(ApiError::KeyExpired),
+        KeyHolder::Unknown => Err(ApiError::Unauthenticated(UNKNOWN)),
+    }
+}
+
+/// A token has three parts (RFC 7515); a key has no points.
+fn is_token(text: &str) -> bool {
+    text.split('.').count() == 3
+}
+
+/// Who a token of the identity provider says it is, as a user of this service.
+async fn of_token(oidc: &Oidc, token: &str, state: &AppState) -> Result<Caller, ApiError> {
+    const NOBODY: &str =
+        "The token is good, but its user is disabled here or its organisation is not known. Ask an administrator.";
+    let provided = oidc.provided(token).await?;
+    let client = state.store.user_of_token(&provided).await?.ok_or(ApiError::Unauthenticated(NOBODY))?;
+    Ok(Caller { access: client.access(), client })
 }
 
 /// The token in the cookie of the pages.

@@ -1,11 +1,11 @@
 //! Clients: the holders of keys. For administrators.
 
 use super::auth::Admin;
-use super::error::ApiError;
+use super::error::{ApiError, FieldError};
 use super::request::{ApiJson, ApiPath};
 use super::state::AppState;
 use super::text;
-use crate::storage::{Client, ClientId, Role};
+use crate::storage::{Client, ClientId, Role, Rotation};
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -19,7 +19,10 @@ use utoipa_axum::routes;
 
 /// Routes of this file.
 pub fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(create_client, list_clients)).routes(routes!(revoke_client))
+    OpenApiRouter::new()
+        .routes(routes!(create_client, list_clients))
+        .routes(routes!(revoke_client))
+        .routes(routes!(rotate_client))
 }
 
 /// A client to be made.
@@ -33,7 +36,29 @@ pub struct ClientRequest {
     #[garde(length(chars, min = 1, max = 64), custom(text::required_line))]
     #[schema(min_length = 1, max_length = 64, pattern = "^[^\\u0000-\\u001f\\u007f]*$", example = "living room kit 7")]
     pub label: String,
+    /// When the key is to end by itself; absent for a key that does not.
+    #[serde(default, with = "time::serde::rfc3339::option")]
+    #[garde(custom(text::calendar_time))]
+    pub expires_at: Option<OffsetDateTime>,
 }
+
+/// What a rotation changes besides the key.
+#[derive(Debug, Clone, Default, Deserialize, Validate, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RotationRequest {
+    /// For how many seconds the key before opens as well; absent ends it at once.
+    #[garde(range(max = LONGEST_OVERLAP_S))]
+    #[serde(default)]
+    #[schema(minimum = 0, maximum = 2_592_000)]
+    pub overlap_s: Option<u32>,
+    /// When the new key is to end by itself; absent leaves the end of the key before.
+    #[serde(default, with = "time::serde::rfc3339::option")]
+    #[garde(custom(text::calendar_time))]
+    pub expires_at: Option<OffsetDateTime>,
+}
+
+/// Longest time in which two keys of one client open, seconds: thirty days, in which every kit is switched on once.
+const LONGEST_OVERLAP_S: u32 = 30 * 24 * 3600;
 
 /// A holder of a key.
 #[derive(Debug, Clone, Serialize, ToSchema)]
@@ -47,6 +72,12 @@ pub struct ClientResponse {
     /// When the key was made.
     #[serde(with = "time::serde::rfc3339")]
     pub created_at: OffsetDateTime,
+    /// When the key ends by itself; null for one that does not.
+    #[serde(with = "time::serde::rfc3339::option")]
+    pub expires_at: Option<OffsetDateTime>,
+    /// Until when the key before the last rotation opens as well; null when there was none.
+    #[serde(with = "time::serde::rfc3339::option")]
+    pub previous_key_until: Option<OffsetDateTime>,
     /// Since when the key opens nothing; null while it is valid.
     #[serde(with = "time::serde::rfc3339::option")]
     pub revoked_at: Option<OffsetDateTime>,
@@ -57,8 +88,9 @@ pub struct ClientResponse {
 
 impl From<Client> for ClientResponse {
     fn from(client: Client) -> Self {
-        let Client { id, organisation_id: _, role, label, created_at, revoked_at, last_used_at } = client;
-        Self { id, role, label, created_at, revoked_at, last_used_at }
+        let Client { id, organisation_id: _, role, label, created_at, expires_at, .. } = client;
+        let Client { revoked_at, previous_key_until, last_used_at, .. } = client;
+        Self { id, role, label, created_at, expires_at, previous_key_until, revoked_at, last_used_at }
     }
 }
 
@@ -92,6 +124,7 @@ pub struct ClientPath {
 ///
 /// The key is in the answer and nowhere else: it cannot be shown again.
 #[utoipa::path(post, path = "/v1/clients", tag = "clients", operation_id = "create_client",
+    security(("api_key" = ["admin"])),
     request_body = ClientRequest,
     responses((status = 201, description = "Made; the key is shown this once", body = NewClientResponse)))]
 async fn create_client(
@@ -99,14 +132,17 @@ async fn create_client(
     Admin(caller): Admin,
     ApiJson(request): ApiJson<ClientRequest>,
 ) -> Result<Response, ApiError> {
-    let organisation = caller.access.organisation;
-    let (client, key) = state.store.create_client(organisation, request.role, &request.label).await?;
+    check_is_ahead(&state, request.expires_at)?;
+    let ClientRequest { role, label, expires_at } = request;
+    let made = state.store.create_client_until(caller.access.organisation, role, &label, expires_at);
+    let (client, key) = made.await?;
     let body = NewClientResponse { client: client.into(), key: key.reveal().to_owned() };
     Ok((StatusCode::CREATED, Json(body)).into_response())
 }
 
 /// List clients
 #[utoipa::path(get, path = "/v1/clients", tag = "clients", operation_id = "list_clients",
+    security(("api_key" = ["admin"])),
     responses((status = 200, description = "Every client of the organisation", body = ClientsResponse)))]
 async fn list_clients(State(state): State<AppState>, Admin(caller): Admin) -> Result<Json<ClientsResponse>, ApiError> {
     let clients = state.store.clients(caller.access.organisation).await?;
@@ -118,6 +154,7 @@ async fn list_clients(State(state): State<AppState>, Admin(caller): Admin) -> Re
 /// The key opens nothing from then on; the client stays in the list, because recordings name it. Repeating it changes
 /// nothing.
 #[utoipa::path(delete, path = "/v1/clients/{id}", tag = "clients", operation_id = "revoke_client",
+    security(("api_key" = ["admin"])),
     params(ClientPath),
     responses((status = 200, description = "The client, revoked", body = ClientResponse),
               (status = 409, description = "A key cannot revoke itself", body = super::error::Problem,
@@ -132,4 +169,37 @@ async fn revoke_client(
         return Err(ApiError::Conflict("own_key", detail.into()));
     }
     Ok(Json(state.store.revoke_client(caller.access.organisation, path.id).await?.into()))
+}
+
+/// Replace a client's key
+///
+/// The client stays who it is: a device keeps its sessions. The key before ends at once, or after `overlap_s`, in which both
+/// open. The new key is in the answer and nowhere else.
+#[utoipa::path(post, path = "/v1/clients/{id}/rotate", tag = "clients", operation_id = "rotate_client",
+    security(("api_key" = ["admin"])),
+    params(ClientPath), request_body = RotationRequest,
+    responses((status = 200, description = "The client with its new key, which is shown this once", body = NewClientResponse),
+              (status = 409, description = "The key was revoked, or has come to its end and no later one is given",
+               body = super::error::Problem, content_type = "application/problem+json")))]
+async fn rotate_client(
+    State(state): State<AppState>,
+    Admin(caller): Admin,
+    ApiPath(path): ApiPath<ClientPath>,
+    ApiJson(request): ApiJson<RotationRequest>,
+) -> Result<Json<NewClientResponse>, ApiError> {
+    check_is_ahead(&state, request.expires_at)?;
+    let overlap = time::Duration::seconds(request.overlap_s.unwrap_or(0).into());
+    let rotation = Rotation { overlap, expires_at: request.expires_at };
+    let (client, key) = state.store.rotate_client(caller.access.organisation, path.id, rotation).await?;
+    Ok(Json(NewClientResponse { client: client.into(), key: key.reveal().to_owned() }))
+}
+
+/// What ends in the past would never begin.
+pub(super) fn check_is_ahead(state: &AppState, expires_at: Option<OffsetDateTime>) -> Result<(), ApiError> {
+    match expires_at {
+        Some(end) if end <= state.store.now() => {
+            Err(ApiError::InvalidBody(vec![FieldError::new("expires_at", "must lie ahead")]))
+        }
+        _ => Ok(()),
+    }
 }

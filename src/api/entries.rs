@@ -117,6 +117,7 @@ pub struct InputsQuery {
 ///
 /// The newest set counts as a whole; earlier ones are kept. An answer that is left out is not known.
 #[utoipa::path(post, path = "/v1/patients/{id}/questionnaires", tag = "entries", operation_id = "add_questionnaire",
+    security(("api_key" = ["clinician"])),
     params(PatientPath), request_body = Answers,
     responses((status = 201, description = "Added", body = QuestionnaireResponse)))]
 async fn add_questionnaire(
@@ -134,6 +135,7 @@ async fn add_questionnaire(
 ///
 /// Newest first, in pages.
 #[utoipa::path(get, path = "/v1/patients/{id}/questionnaires", tag = "entries", operation_id = "list_questionnaires",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, InputsQuery),
     responses((status = 200, description = "One page", body = Page<QuestionnaireResponse>)))]
 async fn list_questionnaires(
@@ -153,6 +155,7 @@ async fn list_questionnaires(
 ///
 /// Of each measure the value measured last counts.
 #[utoipa::path(post, path = "/v1/patients/{id}/measurements", tag = "entries", operation_id = "add_measurement",
+    security(("api_key" = ["clinician"])),
     params(PatientPath), request_body = MeasurementRequest,
     responses((status = 201, description = "Added", body = MeasurementResponse)))]
 async fn add_measurement(
@@ -175,6 +178,7 @@ async fn add_measurement(
 ///
 /// Those added last first, in pages.
 #[utoipa::path(get, path = "/v1/patients/{id}/measurements", tag = "entries", operation_id = "list_measurements",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, InputsQuery),
     responses((status = 200, description = "One page", body = Page<MeasurementResponse>)))]
 async fn list_measurements(
@@ -194,6 +198,7 @@ async fn list_measurements(
 ///
 /// The newest plan counts; earlier ones are kept. What was done of it stands in the report.
 #[utoipa::path(post, path = "/v1/patients/{id}/training-plans", tag = "entries", operation_id = "add_training_plan",
+    security(("api_key" = ["clinician"])),
     params(PatientPath), request_body = TrainingPlan,
     responses((status = 201, description = "Added", body = TrainingPlanResponse)))]
 async fn add_training_plan(
@@ -211,6 +216,7 @@ async fn add_training_plan(
 ///
 /// Newest first, in pages.
 #[utoipa::path(get, path = "/v1/patients/{id}/training-plans", tag = "entries", operation_id = "list_training_plans",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, InputsQuery),
     responses((status = 200, description = "One page", body = Page<TrainingPlanResponse>)))]
 async fn list_training_plans(

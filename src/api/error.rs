@@ -6,7 +6,7 @@
 use crate::queue::Crowded;
 use crate::recording::DecodeError;
 use crate::storage::StorageError;
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -67,6 +67,10 @@ pub enum ApiError {
     InvalidBody(Vec<FieldError>),
     /// No key, or a key nobody knows.
     Unauthenticated(&'static str),
+    /// A key that has come to its end, or that another has replaced.
+    KeyExpired,
+    /// More requests than are served; the seconds after which there is room again, and whose limit it is.
+    TooManyRequests(u64, &'static str),
     /// A good key whose role does not reach this far.
     Forbidden(&'static str),
     /// Nothing here that the caller may see; the text names the kind of thing.
@@ -126,6 +130,16 @@ impl ApiError {
             }
             Self::InvalidBody(errors) => Problem::new(S::UNPROCESSABLE_ENTITY, "invalid_body", listed(errors)),
             Self::Unauthenticated(detail) => Problem::new(S::UNAUTHORIZED, "unauthenticated", *detail),
+            Self::KeyExpired => {
+                let detail =
+                    "This API key has expired, or it was replaced by a new one. Ask an administrator for the new key.";
+                Problem::new(S::UNAUTHORIZED, "key_expired", detail)
+            }
+            Self::TooManyRequests(wait_s, whose) => {
+                let detail =
+                    format!("There were more requests than {whose} may send. Wait {wait_s} s and send it again.");
+                Problem::new(S::TOO_MANY_REQUESTS, "too_many_requests", detail)
+            }
             Self::Forbidden(needed) => {
                 let detail = format!("This request needs a key with the role {needed}. Ask an administrator for one.");
                 Problem::new(S::FORBIDDEN, "forbidden", detail)
@@ -175,6 +189,14 @@ impl ApiError {
             Self::Internal(_) => Problem::of_status(S::INTERNAL_SERVER_ERROR),
         }
         .with_errors(self.field_errors())
+    }
+
+    /// The header that says when to try again, where a refusal is for now only.
+    pub fn retry_after(&self) -> Option<(HeaderName, HeaderValue)> {
+        match self {
+            Self::TooManyRequests(wait_s, _) => Some((header::RETRY_AFTER, HeaderValue::from(*wait_s))),
+            _ => None,
+        }
     }
 
     fn field_errors(&self) -> Vec<FieldError> {
@@ -309,7 +331,9 @@ impl IntoResponse for ApiError {
         if let Self::Internal(error) = &self {
             tracing::error!(error = format!("{error:#}"), "request failed");
         }
-        self.problem().into_response()
+        let mut response = self.problem().into_response();
+        response.headers_mut().extend(self.retry_after());
+        response
     }
 }
 

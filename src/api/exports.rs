@@ -98,6 +98,7 @@ impl JointsResponse {
 /// Every sample as text: `csv` (all channels with intervals and flags), `mot` (joint angles for OpenSim), `trc` (joint places for
 /// OpenSim), `bvh` (joint angles on the linked skeleton, in place).
 #[utoipa::path(get, path = "/v1/assessments/{id}/export", tag = "assessments", operation_id = "export_assessment",
+    security(("api_key" = ["device"])),
     params(AssessmentPath, ExportQuery),
     responses((status = 200, description = "The file", content((String = "text/csv"), (String = "text/plain")))))]
 async fn export_assessment(
@@ -141,6 +142,7 @@ async fn export_assessment(
 /// For replay, at most sixty frames a second: positions that the assessment estimates (fusion, leg pose), or else those that the
 /// camera gave.
 #[utoipa::path(get, path = "/v1/assessments/{id}/joints", tag = "assessments", operation_id = "read_joints",
+    security(("api_key" = ["device"])),
     params(AssessmentPath, JointsQuery),
     responses((status = 200, description = "The joints", body = JointsResponse)))]
 async fn read_joints(

@@ -92,6 +92,7 @@ pub struct ResourcePath {
 /// that groups them (`preliminary` until a clinician signs), and a Provenance for each assessment they rest on. The patient is
 /// referenced and never inlined.
 #[utoipa::path(get, path = "/v1/patients/{id}/fhir-bundle", tag = "fhir", operation_id = "read_fhir_bundle",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, ReportQuery),
     responses((status = 200, description = "The bundle", content_type = "application/fhir+json", body = Value)))]
 async fn read_fhir_bundle(
@@ -110,6 +111,7 @@ async fn read_fhir_bundle(
 /// A collection with an Observation for each channel, as sampled data with one period; at most ten thousand samples of each, longer
 /// ones are read as CSV. Intervals and flags are not in it.
 #[utoipa::path(get, path = "/v1/assessments/{id}/fhir-bundle", tag = "fhir", operation_id = "read_fhir_series",
+    security(("api_key" = ["clinician"])),
     params(AssessmentPath),
     responses((status = 200, description = "The bundle", content_type = "application/fhir+json", body = Value)))]
 async fn read_fhir_series(
@@ -143,6 +145,7 @@ async fn fhir_metadata(State(state): State<AppState>) -> Response {
 ///
 /// The measures of a patient, those stored last first. `date` is when they were measured.
 #[utoipa::path(get, path = "/fhir/R4/Observation", tag = "fhir", operation_id = "search_observations",
+    security(("api_key" = ["clinician"])),
     params(FhirQuery),
     responses((status = 200, description = "A searchset", content_type = "application/fhir+json", body = Value)))]
 async fn search_observations(
@@ -170,6 +173,7 @@ async fn search_observations(
 
 /// Read an Observation
 #[utoipa::path(get, path = "/fhir/R4/Observation/{id}", tag = "fhir", operation_id = "read_observation",
+    security(("api_key" = ["clinician"])),
     params(ResourcePath),
     responses((status = 200, description = "The resource", content_type = "application/fhir+json", body = Value)))]
 async fn read_observation(
@@ -186,6 +190,7 @@ async fn read_observation(
 ///
 /// A finding for each rule, as of now. `code` is a rule's id.
 #[utoipa::path(get, path = "/fhir/R4/RiskAssessment", tag = "fhir", operation_id = "search_risk_assessments",
+    security(("api_key" = ["clinician"])),
     params(FhirQuery),
     responses((status = 200, description = "A searchset", content_type = "application/fhir+json", body = Value)))]
 async fn search_risk_assessments(
@@ -204,6 +209,7 @@ async fn search_risk_assessments(
 
 /// Read a RiskAssessment
 #[utoipa::path(get, path = "/fhir/R4/RiskAssessment/{id}", tag = "fhir", operation_id = "read_risk_assessment",
+    security(("api_key" = ["clinician"])),
     params(ResourcePath),
     responses((status = 200, description = "The resource", content_type = "application/fhir+json", body = Value)))]
 async fn read_risk_assessment(
@@ -224,6 +230,7 @@ async fn read_risk_assessment(
 ///
 /// The report of a patient, as of now.
 #[utoipa::path(get, path = "/fhir/R4/DiagnosticReport", tag = "fhir", operation_id = "search_diagnostic_reports",
+    security(("api_key" = ["clinician"])),
     params(FhirQuery),
     responses((status = 200, description = "A searchset", content_type = "application/fhir+json", body = Value)))]
 async fn search_diagnostic_reports(
@@ -241,6 +248,7 @@ async fn search_diagnostic_reports(
 
 /// Read a DiagnosticReport
 #[utoipa::path(get, path = "/fhir/R4/DiagnosticReport/{id}", tag = "fhir", operation_id = "read_diagnostic_report",
+    security(("api_key" = ["clinician"])),
     params(ResourcePath),
     responses((status = 200, description = "The resource", content_type = "application/fhir+json", body = Value)))]
 async fn read_diagnostic_report(

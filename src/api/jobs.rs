@@ -136,7 +136,8 @@ pub struct JobsQuery {
 /// List jobs
 ///
 /// Newest first, in pages.
-#[utoipa::path(get, path = "/v1/jobs", tag = "jobs", operation_id = "list_jobs", params(JobsQuery),
+#[utoipa::path(get, path = "/v1/jobs", tag = "jobs", operation_id = "list_jobs",
+    security(("api_key" = ["device"])), params(JobsQuery),
     responses((status = 200, description = "One page", body = Page<JobResponse>)))]
 async fn list_jobs(
     State(state): State<AppState>,
@@ -155,7 +156,8 @@ async fn list_jobs(
 }
 
 /// Read a job
-#[utoipa::path(get, path = "/v1/jobs/{id}", tag = "jobs", operation_id = "read_job", params(JobPath),
+#[utoipa::path(get, path = "/v1/jobs/{id}", tag = "jobs", operation_id = "read_job",
+    security(("api_key" = ["device"])), params(JobPath),
     responses((status = 200, description = "The job", body = JobResponse),
               (status = 304, description = "Not changed since the ETag in If-None-Match")))]
 async fn read_job(
@@ -171,7 +173,8 @@ async fn read_job(
 /// Stop a job
 ///
 /// A job that waits is cancelled at once; one that runs as soon as its worker looks up. Repeating it changes nothing.
-#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", tag = "jobs", operation_id = "cancel_job", params(JobPath),
+#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", tag = "jobs", operation_id = "cancel_job",
+    security(("api_key" = ["device"])), params(JobPath),
     responses((status = 202, description = "The request is noted; the job says how far it is", body = JobResponse),
               (status = 409, description = "The job is done or has failed", body = super::error::Problem,
                content_type = "application/problem+json")))]
@@ -188,7 +191,8 @@ async fn cancel_job(
 ///
 /// Server-sent events named `job`, each with the job as it then is: one at once, one after every change of state or
 /// progress, and the last when the job is over; then the stream ends.
-#[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "jobs", operation_id = "read_job_events", params(JobPath),
+#[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "jobs", operation_id = "read_job_events",
+    security(("api_key" = ["device"])), params(JobPath),
     responses((status = 200, description = "The events", body = String, content_type = "text/event-stream")))]
 async fn read_job_events(
     State(state): State<AppState>,

@@ -18,29 +18,36 @@ pub mod jobs;
 pub mod metrics;
 pub mod noise_models;
 pub mod observe;
+pub mod oidc;
 mod openapi;
 pub mod page;
 pub mod patients;
+pub mod peer;
 pub mod protocols;
+pub mod rates;
 pub mod recordings;
 pub mod report;
 pub mod request;
 pub mod series;
 pub mod sessions;
+pub mod shares;
 pub mod state;
 pub mod text;
 pub mod upload;
+pub mod users;
 
 pub use state::AppState;
 
 use axum::Router;
-use axum::http::{HeaderName, StatusCode, header};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware;
 use std::time::Duration;
+use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove};
 use tower_http::sensitive_headers::SetSensitiveRequestHeadersLayer;
+use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::TimeoutLayer;
 use utoipa_axum::router::OpenApiRouter;
 
@@ -68,12 +75,20 @@ pub fn router_with(others: Router<AppState>, state: AppState) -> Router {
         .merge(docs::router(&openapi::complete(&document)))
         .merge(others)
         .fallback(|| async { StatusCode::NOT_FOUND })
+        .layer(middleware::from_fn_with_state(state.clone(), rates::count_strangers))
         .layer(CatchPanicLayer::custom(observe::problem_of_panic))
         .layer(middleware::from_fn(observe::observe))
+        .layer(option_layer(state.config.behind_tls.then(only_by_tls)))
         .layer(CompressionLayer::new().compress_when(compressible))
         .layer(middleware::map_response(etag::weaken_when_compressed))
         .layer(SetSensitiveRequestHeadersLayer::new(SECRET_HEADERS))
         .with_state(state)
+}
+
+/// Tells browsers to come by TLS only, for a year (RFC 6797); said only where the operator has it.
+fn only_by_tls() -> SetResponseHeaderLayer<HeaderValue> {
+    let policy = HeaderValue::from_static("max-age=31536000");
+    SetResponseHeaderLayer::overriding(header::STRICT_TRANSPORT_SECURITY, policy)
 }
 
 /// The OpenAPI document, as it is served and as it stands in `openapi/openapi.json`.
@@ -98,6 +113,8 @@ fn documented_routes() -> OpenApiRouter<AppState> {
         .merge(exports::router())
         .merge(fhir::router())
         .merge(clients::router())
+        .merge(users::router())
+        .merge(shares::router())
         .merge(health::router())
         .merge(metrics::router())
         .layer(timeout);

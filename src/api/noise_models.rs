@@ -162,6 +162,7 @@ pub struct NoiseModelsQuery {
 /// From stored recordings of the organisation, as a job: its progress, its end and its cancellation are those of any job,
 /// and the finished job names the model.
 #[utoipa::path(post, path = "/v1/noise-models", tag = "noise models", operation_id = "create_noise_model",
+    security(("api_key" = ["clinician"])),
     request_body = NoiseModelRequest,
     responses((status = 202, description = "Queued; Location says where the job lives", body = JobResponse)))]
 async fn create_noise_model(
@@ -196,7 +197,7 @@ async fn check_recordings(state: &AppState, access: &Access, request: &NoiseMode
                 refuse("is given twice");
                 continue;
             }
-            match state.store.recording(access, *id).await {
+            match state.store.recording(&access.own(), *id).await {
                 Ok(recording) if recording.inspection.n_frames > 0 => {}
                 Ok(_) => refuse("has no skeleton frames"),
                 Err(StorageError::NotFound { .. }) => refuse("is no recording that your key may see"),
@@ -211,6 +212,7 @@ async fn check_recordings(state: &AppState, access: &Access, request: &NoiseMode
 ///
 /// Trained ones newest first, then those that come with the software, in pages.
 #[utoipa::path(get, path = "/v1/noise-models", tag = "noise models", operation_id = "list_noise_models",
+    security(("api_key" = ["clinician"])),
     params(NoiseModelsQuery),
     responses((status = 200, description = "One page", body = Page<NoiseModelItem>)))]
 async fn list_noise_models(
@@ -252,6 +254,7 @@ fn append_shipped(
 ///
 /// By its id, its name (the newest version) or `name@version`.
 #[utoipa::path(get, path = "/v1/noise-models/{id}", tag = "noise models", operation_id = "read_noise_model",
+    security(("api_key" = ["clinician"])),
     params(NoiseModelPath),
     responses((status = 200, description = "The model", body = NoiseModelResponse),
               (status = 304, description = "Not changed since the ETag in If-None-Match")))]

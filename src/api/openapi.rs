@@ -16,7 +16,14 @@ the assessment that the finished job names.
 
 **Keys.** Every address under `/v1` needs `Authorization: Bearer <key>`. A key belongs to one organisation and one \
 role: `device` uploads and sees its own sessions, `clinician` sees the patients of the organisation, `admin` makes and \
-revokes keys. What belongs to another organisation does not exist: 404.
+revokes keys. Where the operator has an identity provider, its tokens are taken in place of a key. The role that an operation needs at least stands in its security requirement; a higher role may do what a \
+lower one may, in the order device, clinician, admin. What belongs to another organisation does not exist: 404.
+
+**Sharing.** A clinician may let one clinician of another organisation read one patient until a time (`POST \
+/v1/patients/{id}/shares`); the receiver finds it under `GET /v1/shares`, reads what is of that patient, and changes nothing.
+
+**Limits.** A key, a user, and an address without a valid key may send so many requests in a minute; what is more answers \
+429 with `Retry-After`.
 
 **Noise models** say how far a sensor is off. Settings name one that is shipped, or one that the organisation trained \
 (`POST /v1/noise-models`); a session may name the one of its sensor.
@@ -49,6 +56,8 @@ person, and the paths of the fields concerned.
         (name = "fhir", description = "The same as FHIR R4 resources, read-only"),
         (name = "noise models", description = "Noise of sensors, shipped and trained"),
         (name = "clients", description = "Holders of keys"),
+        (name = "shares", description = "Patients that another organisation may read"),
+        (name = "users", description = "People who sign in"),
         (name = "health", description = "For the operator"),
     )
 )]
@@ -98,19 +107,23 @@ pub(super) fn complete(document: &OpenApi) -> Value {
 
 /// What any handler of this kind may answer, when the handler's own words do not say it already.
 fn document_refusals(path: &str, operation: &mut Value) {
-    let keyed = operation.get("security").is_none();
+    let keyed = is_keyed(operation);
+    // What watches the service is never limited.
+    let limited = !path.starts_with("/health") && path != "/metrics";
     let body = operation.get("requestBody").is_some();
     let parameters = operation.get("parameters").is_some();
     let refusals = [
         (400, "A parameter or the body cannot be understood", parameters || body),
-        (401, "The key is missing, unknown or revoked", keyed),
+        (401, "The key is missing, unknown, expired or revoked", keyed),
         (403, "The role of the key does not reach this far", keyed),
         (404, "There is no such thing that the key may see", path.contains('{') || path.starts_with("/fhir") && keyed),
         (408, "The request did not arrive in time", body),
         (413, "The body is too large", body),
         (415, "The content type is not accepted", body),
         (422, "The body was understood, but its content is refused", body),
+        (429, "Too many requests; Retry-After says how many seconds to wait", limited),
         (500, "Our fault", true),
+        (503, "The keys of the identity provider cannot be had", keyed),
     ];
     let problem = json!({PROBLEM_JSON: {"schema": {"$ref": "#/components/schemas/Problem"}}});
     for (status, description, _) in refusals.into_iter().filter(|(_, _, applies)| *applies) {
@@ -119,6 +132,16 @@ fn document_refusals(path: &str, operation: &mut Value) {
             *response = json!({"description": description, "content": problem});
         }
     }
+    if limited {
+        operation["responses"]["429"]["headers"]["Retry-After"] =
+            json!({"description": "Seconds to wait", "schema": {"type": "integer", "minimum": 1}});
+    }
+}
+
+/// True of an operation that asks for a key; one that is open says so by a requirement of nothing.
+fn is_keyed(operation: &Value) -> bool {
+    let requirements = operation.get("security").and_then(Value::as_array);
+    requirements.is_none_or(|all| all.iter().all(|one| one.as_object().is_some_and(|one| !one.is_empty())))
 }
 
 /// A parameter that is not required may be absent; it cannot be null, which an address has no way to say.
@@ -205,10 +228,12 @@ fn name_contents(document: &mut Value) {
 }
 
 /// Where the ids of an answer lead: (operation, status, place of the id in the body, operations that take it as `id`).
-const LINKS: [(&str, &str, &str, &[&str]); 10] = [
+const LINKS: [(&str, &str, &str, &[&str]); 12] = [
     ("create_patient", "201", "/id", &["read_patient", "update_patient"]),
     ("create_session", "201", "/id", &["read_session", "list_recordings", "upload_recording"]),
-    ("create_client", "201", "/client/id", &["revoke_client"]),
+    ("create_client", "201", "/client/id", &["revoke_client", "rotate_client"]),
+    ("create_share", "201", "/id", &["revoke_share"]),
+    ("create_user", "201", "/user/id", &["reset_user", "disable_user"]),
     ("upload_recording", "202", "/recording/id", &["read_recording", "read_recording_content", "create_job"]),
     ("upload_recording", "202", "/job/id", &["read_job", "read_job_events", "cancel_job"]),
     ("create_job", "202", "/id", &["read_job", "read_job_events", "cancel_job"]),

@@ -141,6 +141,7 @@ pub struct PatientsQuery {
 
 /// Make a patient known
 #[utoipa::path(post, path = "/v1/patients", tag = "patients", operation_id = "create_patient",
+    security(("api_key" = ["clinician"])),
     request_body = PatientRequest,
     responses((status = 201, description = "Made; Location says where it lives", body = PatientResponse),
               (status = 409, description = "The pseudonym is taken", body = super::error::Problem,
@@ -160,7 +161,8 @@ async fn create_patient(
 /// List patients
 ///
 /// Newest first, in pages.
-#[utoipa::path(get, path = "/v1/patients", tag = "patients", operation_id = "list_patients", params(PatientsQuery),
+#[utoipa::path(get, path = "/v1/patients", tag = "patients", operation_id = "list_patients",
+    security(("api_key" = ["clinician"])), params(PatientsQuery),
     responses((status = 200, description = "One page", body = Page<PatientResponse>)))]
 async fn list_patients(
     State(state): State<AppState>,
@@ -176,7 +178,8 @@ async fn list_patients(
 }
 
 /// Read a patient
-#[utoipa::path(get, path = "/v1/patients/{id}", tag = "patients", operation_id = "read_patient", params(PatientPath),
+#[utoipa::path(get, path = "/v1/patients/{id}", tag = "patients", operation_id = "read_patient",
+    security(("api_key" = ["clinician"])), params(PatientPath),
     responses((status = 200, description = "The patient", body = PatientResponse),
               (status = 304, description = "Not changed since the ETag in If-None-Match")))]
 async fn read_patient(
@@ -193,6 +196,7 @@ async fn read_patient(
 ///
 /// Fields that are absent stay; null clears a field.
 #[utoipa::path(patch, path = "/v1/patients/{id}", tag = "patients", operation_id = "update_patient",
+    security(("api_key" = ["clinician"])),
     params(PatientPath), request_body = PatientPatch,
     responses((status = 200, description = "The patient as it is after the change", body = PatientResponse),
               (status = 409, description = "The pseudonym is taken", body = super::error::Problem,

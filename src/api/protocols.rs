@@ -38,6 +38,7 @@ pub struct ProtocolPath {
 /// Exercises and tests that a recording can hold: how they are done and recorded, what is measured of them and how. A recording
 /// that names one in its header, or whose session does, is measured by it.
 #[utoipa::path(get, path = "/v1/protocols", tag = "protocols", operation_id = "list_protocols",
+    security(("api_key" = ["device"])),
     responses((status = 200, description = "The catalogue", body = ProtocolsResponse)))]
 async fn list_protocols(_: Caller) -> Json<ProtocolsResponse> {
     let items = PROTOCOLS.iter().map(|protocol| protocol.info(rules_of_measure)).collect();
@@ -46,6 +47,7 @@ async fn list_protocols(_: Caller) -> Json<ProtocolsResponse> {
 
 /// Read a protocol
 #[utoipa::path(get, path = "/v1/protocols/{id}", tag = "protocols", operation_id = "read_protocol",
+    security(("api_key" = ["device"])),
     params(ProtocolPath),
     responses((status = 200, description = "The protocol", body = ProtocolInfo)))]
 async fn read_protocol(_: Caller, ApiPath(path): ApiPath<ProtocolPath>) -> Result<Json<ProtocolInfo>, ApiError> {

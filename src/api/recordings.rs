@@ -156,6 +156,7 @@ fn validate_leg_pose(settings: &LegPoseSettings, parent: &mut dyn FnMut() -> gar
 ///
 /// Newest first, in pages.
 #[utoipa::path(get, path = "/v1/sessions/{id}/recordings", tag = "recordings", operation_id = "list_recordings",
+    security(("api_key" = ["device"])),
     params(SessionPath, RecordingsQuery),
     responses((status = 200, description = "One page", body = Page<RecordingResponse>)))]
 async fn list_recordings(
@@ -177,6 +178,7 @@ async fn list_recordings(
 ///
 /// What is known of it; its bytes are at `/v1/recordings/{id}/content`.
 #[utoipa::path(get, path = "/v1/recordings/{id}", tag = "recordings", operation_id = "read_recording",
+    security(("api_key" = ["device"])),
     params(RecordingPath),
     responses((status = 200, description = "The recording", body = RecordingResponse),
               (status = 304, description = "Not changed since the ETag in If-None-Match")))]
@@ -194,6 +196,7 @@ async fn read_recording(
 ///
 /// The very bytes that were uploaded.
 #[utoipa::path(get, path = "/v1/recordings/{id}/content", tag = "recordings", operation_id = "read_recording_content",
+    security(("api_key" = ["device"])),
     params(RecordingPath),
     responses((status = 200, description = "The bytes", content(
                 (Vec<u8> = "application/mcap"), (Object = "application/json"))),
@@ -252,6 +255,7 @@ fn validate_fusion(
 ///
 /// With a pipeline and settings of the caller's choice. Earlier assessments stay.
 #[utoipa::path(post, path = "/v1/recordings/{id}/jobs", tag = "recordings", operation_id = "create_job",
+    security(("api_key" = ["device"])),
     params(RecordingPath), request_body = Settings,
     responses((status = 202, description = "Queued; Location says where the job lives", body = JobResponse)))]
 async fn create_job(

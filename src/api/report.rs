@@ -165,6 +165,7 @@ pub struct TrendsResponse {
 /// Each with what it says, its limits, its source, the population that it was developed on, how accurate it is and how well
 /// its numbers are confirmed; and the differences between two occasions that count as changes.
 #[utoipa::path(get, path = "/v1/fall-risk-rules", tag = "report", operation_id = "list_fall_risk_rules",
+    security(("api_key" = ["device"])),
     responses((status = 200, description = "Every rule", body = RulesResponse)))]
 async fn list_fall_risk_rules(_: Caller) -> Json<RulesResponse> {
     let items = RULES.iter().map(|rule| rule.info).collect();
@@ -177,6 +178,7 @@ async fn list_fall_risk_rules(_: Caller) -> Json<RulesResponse> {
 /// entered it. Inputs are only ever added, so an earlier state can be read again with `as_of`; the patient's own data are those
 /// of today.
 #[utoipa::path(get, path = "/v1/patients/{id}/fall-risk", tag = "report", operation_id = "read_fall_risk",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, ReportQuery),
     responses((status = 200, description = "A finding for every rule", body = FallRiskResponse)))]
 async fn read_fall_risk(
@@ -200,6 +202,7 @@ async fn read_fall_risk(
 /// Every value that an assessment measured or somebody entered, those stored last first, in pages; also values that a later
 /// assessment of the same recording has replaced.
 #[utoipa::path(get, path = "/v1/patients/{id}/measures", tag = "report", operation_id = "list_measures",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, MeasuresQuery),
     responses((status = 200, description = "One page", body = Page<MeasureRecord>)))]
 async fn list_measures(
@@ -222,6 +225,7 @@ async fn list_measures(
 /// Of each measure and side the latest values of one definition, and whether the newest differs from the one before and from
 /// the first one shown by more than the minimal detectable change. A smaller difference is not reported as a change.
 #[utoipa::path(get, path = "/v1/patients/{id}/trends", tag = "report", operation_id = "list_trends",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, TrendsQuery),
     responses((status = 200, description = "The trends", body = TrendsResponse)))]
 async fn list_trends(
@@ -246,6 +250,7 @@ async fn list_trends(
 /// Findings of every rule, what is missing for those without an answer and what to record next, the newest value of each
 /// measure, trends, adherence to the training plan, and what came of the latest sessions.
 #[utoipa::path(get, path = "/v1/patients/{id}/report", tag = "report", operation_id = "read_report",
+    security(("api_key" = ["clinician"])),
     params(PatientPath, ReportQuery),
     responses((status = 200, description = "The report", body = PatientReport)))]
 async fn read_report(

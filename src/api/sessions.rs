@@ -114,6 +114,7 @@ pub struct SessionsQuery {
 ///
 /// A device sees the sessions that it made itself, and what hangs on them.
 #[utoipa::path(post, path = "/v1/sessions", tag = "sessions", operation_id = "create_session",
+    security(("api_key" = ["device"])),
     request_body = SessionRequest,
     responses((status = 201, description = "Made; Location says where it lives", body = SessionResponse),
               (status = 404, description = "There is no such patient", body = super::error::Problem,
@@ -137,7 +138,8 @@ async fn create_session(
 /// List sessions
 ///
 /// Newest first, in pages.
-#[utoipa::path(get, path = "/v1/sessions", tag = "sessions", operation_id = "list_sessions", params(SessionsQuery),
+#[utoipa::path(get, path = "/v1/sessions", tag = "sessions", operation_id = "list_sessions",
+    security(("api_key" = ["device"])), params(SessionsQuery),
     responses((status = 200, description = "One page", body = Page<SessionResponse>)))]
 async fn list_sessions(
     State(state): State<AppState>,
@@ -153,7 +155,8 @@ async fn list_sessions(
 }
 
 /// Read a session
-#[utoipa::path(get, path = "/v1/sessions/{id}", tag = "sessions", operation_id = "read_session", params(SessionPath),
+#[utoipa::path(get, path = "/v1/sessions/{id}", tag = "sessions", operation_id = "read_session",
+    security(("api_key" = ["device"])), params(SessionPath),
     responses((status = 200, description = "The session", body = SessionResponse),
               (status = 304, description = "Not changed since the ETag in If-None-Match")))]
 async fn read_session(

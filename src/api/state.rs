@@ -1,6 +1,8 @@
 //! What every handler can reach.
 
 use super::metrics;
+use super::oidc::{Oidc, OidcError};
+use super::rates::Rates;
 use super::series::RecentSeries;
 use crate::config::Config;
 use crate::queue::Queue;
@@ -14,6 +16,17 @@ use tokio_util::sync::CancellationToken;
 /// JSON recordings that are held in memory at the same time. With the limit of each in the configuration this bounds
 /// the memory of uploads; the rest wait at their connection.
 const JSON_UPLOADS_AT_ONCE: usize = 4;
+
+/// Why a service has no state.
+#[derive(Debug, thiserror::Error)]
+pub enum StateError {
+    /// There is another metrics recorder.
+    #[error("the metrics cannot be recorded: {0}")]
+    Metrics(#[from] BuildError),
+    /// The settings of the identity provider do not fit.
+    #[error(transparent)]
+    Oidc(#[from] OidcError),
+}
 
 /// Shared by all requests; a clone is cheap.
 #[derive(Debug, Clone)]
@@ -30,6 +43,10 @@ pub struct AppState {
     pub json_uploads: Arc<Semaphore>,
     /// Series that were read a moment ago.
     pub recent_series: RecentSeries,
+    /// How many requests of whom are served.
+    pub rates: Rates,
+    /// Whose tokens are taken besides keys; none when nobody's are.
+    pub oidc: Option<Arc<Oidc>>,
     /// The numbers for the operator.
     pub metrics: PrometheusHandle,
     /// Fires when the service shuts down, so that endless answers end.
@@ -40,11 +57,13 @@ impl AppState {
     /// The state of one service.
     ///
     /// # Errors
-    /// When the process has another metrics recorder already.
-    pub fn new(queue: Queue, config: Config, limits: Limits) -> Result<Self, BuildError> {
+    /// When the process has another metrics recorder already, or the identity provider's settings do not fit.
+    pub fn new(queue: Queue, config: Config, limits: Limits) -> Result<Self, StateError> {
         Ok(Self {
+            oidc: Oidc::of(&config.oidc)?.map(Arc::new),
             store: queue.store().clone(),
             queue,
+            rates: Rates::new(&config),
             config: Arc::new(config),
             limits,
             json_uploads: Arc::new(Semaphore::new(JSON_UPLOADS_AT_ONCE)),

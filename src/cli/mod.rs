@@ -17,6 +17,7 @@ pub mod simulate;
 pub mod simulate_walker;
 pub mod telemetry;
 pub mod train;
+pub mod user;
 pub mod worker;
 
 use clap::{Parser, Subcommand};
@@ -42,6 +43,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Train(train::Args),
     Key(key::Args),
+    User(user::Args),
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
     Doctor(backup::DoctorArgs),
@@ -90,6 +92,7 @@ pub fn run() -> anyhow::Result<()> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Key(args) => runtime.block_on(key::run(&args)),
+        Command::User(args) => runtime.block_on(user::run(&args)),
         Command::Backup(args) => runtime.block_on(backup::back_up(&args)),
         Command::Restore(args) => runtime.block_on(backup::restore(&args)),
         Command::Doctor(args) => runtime.block_on(backup::examine(&args)),

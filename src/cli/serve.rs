@@ -80,10 +80,8 @@ pub fn load_config(file: Option<&Path>) -> anyhow::Result<Config> {
 fn config_of_sources(file: Option<&Path>, environment: HashMap<String, String>) -> anyhow::Result<Config> {
     let defaults = config::Config::try_from(&Config::default())?;
     // Other programs of this project read variables with the same prefix; only names of settings are taken.
-    let names: Vec<String> = serde_json::to_value(Config::default())?
-        .as_object()
-        .map(|fields| fields.keys().map(|name| format!("SUREFOOT_{}", name.to_uppercase())).collect())
-        .unwrap_or_default();
+    let mut names = Vec::new();
+    names_of_settings("SUREFOOT_", &serde_json::to_value(Config::default())?, &mut names);
     let known = environment.into_iter().filter(|(name, _)| names.contains(&name.to_uppercase())).collect();
     let file = match file {
         Some(path) => config::File::from(path).format(config::FileFormat::Toml).required(true),
@@ -92,10 +90,31 @@ fn config_of_sources(file: Option<&Path>, environment: HashMap<String, String>) 
     config::Config::builder()
         .add_source(defaults)
         .add_source(file)
-        .add_source(config::Environment::with_prefix("SUREFOOT").try_parsing(true).source(Some(known)))
+        .add_source(
+            config::Environment::with_prefix("SUREFOOT")
+                .prefix_separator("_")
+                .separator("__")
+                .try_parsing(true)
+                .list_separator(",")
+                .with_list_parse_key("trusted_proxies")
+                .with_list_parse_key("oidc.algorithms")
+                .source(Some(known)),
+        )
         .build()
         .and_then(config::Config::try_deserialize)
         .context("the configuration cannot be used")
+}
+
+/// Variables of all settings; those within a section have two underscores between section and name.
+fn names_of_settings(before: &str, settings: &serde_json::Value, names: &mut Vec<String>) {
+    for (name, value) in settings.as_object().into_iter().flatten() {
+        let name = format!("{before}{}", name.to_uppercase());
+        if value.is_object() {
+            names_of_settings(&format!("{name}__"), value, names);
+        } else {
+            names.push(name);
+        }
+    }
 }
 
 /// A service that runs in this process.
@@ -154,15 +173,16 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
     let state = AppState { shutdown: stop.clone(), ..AppState::new(queue.clone(), config, limits.clone())? };
 
     let mut workers = worker::spawn(&queue, n_workers, &limits, has_canary, &stop);
-    let metrics = state.metrics.clone();
+    let (metrics, rates) = (state.metrics.clone(), state.rates.clone());
     let upkeep = stop.clone();
     workers.spawn(async move {
         let mut ticks = tokio::time::interval(METRICS_UPKEEP);
         while upkeep.run_until_cancelled(ticks.tick()).await.is_some() {
             metrics.run_upkeep();
+            rates.tidy();
         }
     });
-    let router = pages::router(state);
+    let router = pages::router(state).into_make_service_with_connect_info::<SocketAddr>();
     let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let server = tokio::spawn(serving.into_future());
     Ok(Running { addr, admin_key, store, stop, server, workers })
@@ -267,10 +287,28 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("any.toml");
         std::fs::write(&file, "workers = 7\nlisten = \"0.0.0.0:9000\"\n").unwrap();
-        let set = environment(&[("SUREFOOT_WORKERS", "3"), ("SUREFOOT_DATA", "/elsewhere"), ("PATH", "/bin")]);
+        let set = environment(&[
+            ("SUREFOOT_WORKERS", "3"),
+            ("SUREFOOT_TRUSTED_PROXIES", "127.0.0.1,10.0.0.0/8"),
+            ("SUREFOOT_OIDC__ISSUER", "https://id.example"),
+            ("SUREFOOT_OIDC__ALGORITHMS", "ES256"),
+            ("SUREFOOT_DATA", "/elsewhere"),
+            ("PATH", "/bin"),
+        ]);
         let config = config_of_sources(Some(&file), set).unwrap();
+        assert!(config.trusted_proxies[1].contains([10, 2, 3, 4].into()) && config.trusted_proxies.len() == 2);
         assert_eq!((config.workers, config.listen.port()), (3, 9000));
         assert_eq!(config.data_dir, Config::default().data_dir);
+        assert_eq!(config.oidc.issuer, "https://id.example");
+        assert_eq!(config.oidc.algorithms, [crate::config::OidcAlgorithm::Es256]);
+    }
+
+    #[test]
+    fn an_algorithm_with_a_shared_secret_cannot_be_configured() {
+        for algorithm in ["HS256", "none", "RS512"] {
+            let set = environment(&[("SUREFOOT_OIDC__ALGORITHMS", algorithm)]);
+            assert!(config_of_sources(None, set).is_err(), "{algorithm}");
+        }
     }
 
     #[test]

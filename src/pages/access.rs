@@ -3,13 +3,16 @@
 use super::error::PageError;
 use crate::api::AppState;
 use crate::api::auth::{Caller, PAGE_COOKIE, caller_of_page};
+use crate::api::peer::peer_address;
 use crate::config::Config;
 use crate::storage::page_sessions::LONGEST_SESSION;
 use crate::storage::{PageToken, Role};
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue};
+use axum::http::{HeaderMap, HeaderValue, header};
 use serde::de::DeserializeOwned;
+use std::convert::Infallible;
+use std::net::IpAddr;
 
 /// Where a visitor begins.
 pub(super) const HOME: &str = "/app/patients";
@@ -26,12 +29,30 @@ impl FromRequestParts<AppState> for Visitor {
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, PageError> {
         let caller = caller_of_page(&parts.headers, state).await?;
         match caller {
-            Some(caller) if is_of_pages(caller.client.role) => Ok(Self(caller)),
+            Some(caller) if is_of_pages(caller.client.role) => {
+                state.rates.count_client(caller.client.id)?;
+                Ok(Self(caller))
+            }
             _ => {
+                if parts.headers.contains_key(header::COOKIE) {
+                    state.rates.count_anonymous(parts, &state.config)?;
+                }
                 let next = parts.uri.path_and_query().map_or(HOME, |address| address.as_str()).to_owned();
                 Err(PageError::SignInFirst { next })
             }
         }
+    }
+}
+
+/// The address that a request comes from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Peer(pub IpAddr);
+
+impl FromRequestParts<AppState> for Peer {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, Infallible> {
+        Ok(Self(peer_address(&parts.extensions, &parts.headers, &state.config.trusted_proxies)))
     }
 }
 

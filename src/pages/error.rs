@@ -107,11 +107,13 @@ impl IntoResponse for PageError {
             tracing::error!(error = format!("{error:#}"), "a page failed");
         }
         let (status, heading, text) = self.told();
+        let retry_after = if let Self::Api(error) = &self { error.retry_after() } else { None };
         let shown = page(&ErrorPage { frame: Frame::anonymous(&heading), heading, text });
         let mut response = match shown {
             Ok(page) => (status, page).into_response(),
             Err(_) => status.into_response(),
         };
+        response.headers_mut().extend(retry_after);
         response.extensions_mut().insert(ForPerson);
         response
     }

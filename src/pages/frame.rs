@@ -2,6 +2,7 @@
 
 use super::bundle::BUNDLE;
 use crate::api::auth::Caller;
+use crate::storage::User;
 use askama::Template;
 use axum::response::Html;
 
@@ -12,6 +13,8 @@ pub(super) struct Frame {
     pub title: String,
     /// Label of the key that is signed in; none before the sign-in.
     pub signed_in_as: Option<String>,
+    /// True of somebody who signs in with a password, which can be changed.
+    pub has_password: bool,
     /// Address of the script.
     pub script: &'static str,
     /// Address of the style sheet.
@@ -26,6 +29,7 @@ impl Frame {
         Self {
             title: title.to_owned(),
             signed_in_as: None,
+            has_password: false,
             script: &BUNDLE.script.address,
             style: &BUNDLE.style.address,
             version: env!("CARGO_PKG_VERSION"),
@@ -37,8 +41,17 @@ impl Frame {
         Self {
             title: title.into(),
             signed_in_as: Some(format!("{} ({})", caller.client.label, caller.client.role.name())),
+            has_password: caller.client.is_user,
             ..Self::anonymous("")
         }
+    }
+}
+
+impl Frame {
+    /// The frame of a page for somebody who perhaps has to change the password first.
+    pub(super) fn of_user(user: &User, title: &str) -> Self {
+        let signed_in_as = Some(format!("{} ({})", user.client.label, user.client.role.name()));
+        Self { signed_in_as, ..Self::anonymous(title) }
     }
 }
 

@@ -6,12 +6,12 @@
 
 mod access;
 mod assessment;
-mod attempts;
 mod bundle;
 mod error;
 mod footfall;
 mod frame;
 mod headers;
+mod password;
 mod patients;
 mod report;
 mod session;
@@ -20,14 +20,12 @@ mod sparkline;
 mod words;
 
 use crate::api::{self, AppState};
-use attempts::Attempts;
 use axum::extract::DefaultBodyLimit;
 use axum::http::StatusCode;
 use axum::response::Redirect;
 use axum::routing::{get, post};
-use axum::{Extension, Router, middleware};
+use axum::{Router, middleware};
 use error::PageError;
-use std::sync::Arc;
 use std::time::Duration;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::timeout::TimeoutLayer;
@@ -47,6 +45,7 @@ fn routes() -> Router<AppState> {
         .route("/app", get(|| async { Redirect::to(access::HOME) }))
         .route("/app/sign-in", get(sign_in::show).post(sign_in::sign_in))
         .route("/app/sign-out", post(sign_in::sign_out))
+        .route(password::ADDRESS, get(password::show).post(password::change))
         .route("/app/patients", get(patients::show))
         .route("/app/patients/{id}", get(report::show))
         .route("/app/sessions/{id}", get(session::show))
@@ -54,7 +53,6 @@ fn routes() -> Router<AppState> {
         .route("/app/assessments/{id}", get(assessment::show))
         .route("/app/assets/{name}", get(bundle::serve))
         .route("/app/{*rest}", get(|| async { PageError::NotFound("page") }))
-        .layer(Extension(Arc::new(Attempts::default())))
         .layer(DefaultBodyLimit::max(MAX_FORM_BYTES))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, TIMEOUT))
         .layer(CatchPanicLayer::custom(api::observe::problem_of_panic))

@@ -6,7 +6,7 @@ use super::frame::{Frame, page};
 use super::words;
 use crate::api::AppState;
 use crate::api::page::{cursor_from_id, id_from_cursor};
-use crate::storage::{PageRequest, Patient, PatientFilter, PatientId};
+use crate::storage::{PageRequest, Patient, PatientFilter, PatientId, Share};
 use askama::Template;
 use axum::extract::{Query, State};
 use axum::response::Html;
@@ -35,6 +35,15 @@ struct PatientsPage {
     /// Address of the next page.
     next: Option<String>,
     is_first: bool,
+    shared: Vec<SharedRow>,
+}
+
+/// A patient of another organisation.
+struct SharedRow {
+    id: PatientId,
+    pseudonym: String,
+    organisation: String,
+    until: String,
 }
 
 struct PatientRow {
@@ -69,13 +78,29 @@ pub(super) async fn show(
         PatientRow::of(patient, last)
     };
     let patients = found.items.into_iter().map(row).collect();
+    let shared = match after {
+        None => state.store.shares_received(&caller.access).await?,
+        Some(_) => Vec::new(),
+    };
     Ok(page(&PatientsPage {
         frame: Frame::of(&caller, "Patients"),
         search,
         patients,
         next,
         is_first: after.is_none(),
+        shared: shared.into_iter().map(SharedRow::from).collect(),
     })?)
+}
+
+impl From<Share> for SharedRow {
+    fn from(share: Share) -> Self {
+        Self {
+            id: share.patient_id,
+            pseudonym: share.pseudonym,
+            organisation: share.organisation,
+            until: words::moment(share.expires_at),
+        }
+    }
 }
 
 impl PatientRow {

@@ -1,6 +1,7 @@
 //! Assessments: what one pipeline found in one recording. Written once, together with the end of its job, and never
 //! changed.
 
+use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Row, Transaction, dialects, query};
 use super::joint_tracks::{self, EncodedTrack};
@@ -181,21 +182,26 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn assessment(&self, access: &Access, id: AssessmentId) -> Result<StoredAssessment, StorageError> {
-        let row = query(
+        let row = query(concat!(
             "SELECT a.*, r.session_id, s.patient_id
              FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2) AND a.id = $3",
-        )
+             WHERE a.id = $3 AND ((a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)) OR ",
+            shared_with!("s.patient_id", "$4", "$5"),
+            ")"
+        ))
         .bind(access.organisation)
         .bind(access.only_sessions_of())
         .bind(id)
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_optional(self.reader())
         .await?
         .ok_or(StorageError::not_found("assessment"))?;
         assessment_from_row(&row)
     }
 
-    /// The assessments within the caller's reach, newest first.
+    /// The assessments within the caller's reach, newest first; those of a shared patient when it, a session or a recording is
+    /// asked for.
     ///
     /// # Errors
     /// When the database fails.
@@ -207,32 +213,43 @@ impl Store {
     ) -> Result<Page<StoredAssessment, AssessmentId>, StorageError> {
         // An index can serve a condition only if it is there whatever is bound, hence one text per case.
         macro_rules! assessments_where {
-            ($indexed:literal) => {
+            ($($indexed:expr),+) => {
                 concat!(
                     "SELECT a.*, r.session_id, s.patient_id
                      FROM assessments a JOIN recordings r ON r.id = a.recording_id
                           JOIN sessions s ON s.id = r.session_id
-                     WHERE a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)
-                       AND a.id < $3
+                     WHERE a.id < $3
                        AND ($7 IS NULL OR a.pipeline = $7)
                        AND ($8 IS NULL OR a.method = $8)
                        AND ",
-                    $indexed,
+                    $($indexed,)+
                     " ORDER BY a.id DESC LIMIT $9"
                 )
             };
         }
+        macro_rules! assessments_about {
+            ($indexed:literal) => {
+                assessments_where!(
+                    $indexed,
+                    " AND ((a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)) OR ",
+                    shared_with!("s.patient_id", "$10", "$11"),
+                    ")"
+                )
+            };
+        }
         let question = match (filter.recording_id, filter.session_id, filter.patient_id) {
-            (Some(_), _, _) => assessments_where!(
+            (Some(_), _, _) => assessments_about!(
                 "a.recording_id = $4 AND ($5 IS NULL OR r.session_id = $5) AND ($6 IS NULL OR s.patient_id = $6)"
             ),
             (None, Some(_), _) => {
-                assessments_where!("$4 IS NULL AND r.session_id = $5 AND ($6 IS NULL OR s.patient_id = $6)")
+                assessments_about!("$4 IS NULL AND r.session_id = $5 AND ($6 IS NULL OR s.patient_id = $6)")
             }
-            (None, None, Some(_)) => assessments_where!("$4 IS NULL AND $5 IS NULL AND s.patient_id = $6"),
-            (None, None, None) => assessments_where!("$4 IS NULL AND $5 IS NULL AND $6 IS NULL"),
+            (None, None, Some(_)) => assessments_about!("$4 IS NULL AND $5 IS NULL AND s.patient_id = $6"),
+            (None, None, None) => assessments_where!(
+                "$4 IS NULL AND $5 IS NULL AND $6 IS NULL AND a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)"
+            ),
         };
-        let rows = query(question)
+        let mut question = query(question)
             .bind(access.organisation)
             .bind(access.only_sessions_of())
             .bind(page.cursor())
@@ -241,9 +258,11 @@ impl Store {
             .bind(filter.patient_id)
             .bind(&filter.pipeline)
             .bind(&filter.method)
-            .bind(page.rows())
-            .fetch_all(self.reader())
-            .await?;
+            .bind(page.rows());
+        if filter.recording_id.is_some() || filter.session_id.is_some() || filter.patient_id.is_some() {
+            question = question.bind(access.receiver()).bind(ms_from_time(self.now()));
+        }
+        let rows = question.fetch_all(self.reader()).await?;
         let assessments = rows.iter().map(assessment_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(assessments, page, |assessment| assessment.id))
     }
@@ -300,14 +319,18 @@ impl Store {
         access: &Access,
         id: AssessmentId,
     ) -> Result<Vec<String>, StorageError> {
-        let row = query(
+        let row = query(concat!(
             "SELECT a.channels
              FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
-             WHERE a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2) AND a.id = $3",
-        )
+             WHERE a.id = $3 AND ((a.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)) OR ",
+            shared_with!("s.patient_id", "$4", "$5"),
+            ")"
+        ))
         .bind(access.organisation)
         .bind(access.only_sessions_of())
         .bind(id)
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_optional(self.reader())
         .await?
         .ok_or(StorageError::not_found("assessment"))?;

@@ -54,10 +54,16 @@ pub struct Client {
     pub role: Role,
     /// Whose key it is, for people.
     pub label: String,
+    /// True of a user, who has no key.
+    pub is_user: bool,
     /// When the key was made.
     pub created_at: OffsetDateTime,
+    /// From when on the key opens nothing; none for a key that does not end by itself.
+    pub expires_at: Option<OffsetDateTime>,
     /// Since when the key opens nothing.
     pub revoked_at: Option<OffsetDateTime>,
+    /// Until when the key before the last rotation opens as well.
+    pub previous_key_until: Option<OffsetDateTime>,
     /// When the key was last used, to the minute.
     pub last_used_at: Option<OffsetDateTime>,
 }
@@ -70,8 +76,34 @@ impl Client {
 
     /// How far the client reaches.
     pub fn access(&self) -> Access {
-        Access { organisation: self.organisation_id, client: self.id, own_sessions_only: self.role == Role::Device }
+        let is_device = self.role == Role::Device;
+        Access {
+            organisation: self.organisation_id,
+            client: self.id,
+            own_sessions_only: is_device,
+            reaches_shared: !is_device,
+        }
     }
+}
+
+/// Whose key it is, when somebody brings one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum KeyHolder {
+    /// A client whose key is valid.
+    Valid(Client),
+    /// A client whose key has come to its end, or was replaced and its overlap is over.
+    Expired,
+    /// Nobody, or a client whose key was revoked.
+    Unknown,
+}
+
+/// What a rotation changes besides the key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rotation {
+    /// For how long the key before opens as well; zero ends it at once.
+    pub overlap: Duration,
+    /// When the new key ends; none leaves what was said of the key before.
+    pub expires_at: Option<OffsetDateTime>,
 }
 
 /// The text of a key. It exists only here, at the one time it is made, and with its holder.
@@ -79,7 +111,7 @@ impl Client {
 pub struct ApiKey(String);
 
 impl ApiKey {
-    fn generate() -> Result<Self, StorageError> {
+    pub(super) fn generate() -> Result<Self, StorageError> {
         let mut bits = [0u8; 32];
         SysRng.try_fill_bytes(&mut bits).map_err(|error| StorageError::Randomness(error.to_string()))?;
         Ok(Self(format!("{KEY_PREFIX}{}", hex::encode(bits))))
@@ -95,7 +127,7 @@ impl ApiKey {
         &self.0
     }
 
-    fn digest(&self) -> KeyDigest {
+    pub(super) fn digest(&self) -> KeyDigest {
         Sha256::digest(self.0.as_bytes()).into()
     }
 }
@@ -112,8 +144,11 @@ pub(super) fn client_from_row(row: &Row) -> Result<Client, StorageError> {
         organisation_id: row.try_get("organisation_id")?,
         role: row::word(row, "role")?,
         label: row.try_get("label")?,
+        is_user: row.try_get::<&str>("kind")? == "user",
         created_at: row::time(row, "created_at")?,
+        expires_at: row::optional_time(row, "expires_at")?,
         revoked_at: row::optional_time(row, "revoked_at")?,
+        previous_key_until: row::optional_time(row, "previous_key_until")?,
         last_used_at: row::optional_time(row, "last_used_at")?,
     })
 }
@@ -123,12 +158,13 @@ async fn insert(
     organisation: OrganisationId,
     role: Role,
     label: &str,
+    expires_at: Option<OffsetDateTime>,
     now: OffsetDateTime,
 ) -> Result<(Client, ApiKey), StorageError> {
     let key = ApiKey::generate()?;
     let row = query(
-        "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at)
-         SELECT $1, o.id, $3, $4, $5, $6 FROM organisations o WHERE o.id = $2 RETURNING *",
+        "INSERT INTO clients (id, organisation_id, role, label, key_sha256, created_at, expires_at)
+         SELECT $1, o.id, $3, $4, $5, $6, $7 FROM organisations o WHERE o.id = $2 RETURNING *",
     )
     .bind(ClientId::new())
     .bind(organisation)
@@ -136,6 +172,7 @@ async fn insert(
     .bind(label)
     .bind(&key.digest()[..])
     .bind(ms_from_time(now))
+    .bind(expires_at.map(ms_from_time))
     .fetch_optional(connection)
     .await?
     .ok_or(StorageError::not_found("organisation"))?;
@@ -143,7 +180,7 @@ async fn insert(
 }
 
 impl Store {
-    /// Makes a client and its key. The key is not stored and cannot be shown again.
+    /// Makes a client and its key, which does not end by itself. The key is not stored and cannot be shown again.
     ///
     /// # Errors
     /// `NotFound` when the organisation does not exist.
@@ -153,8 +190,22 @@ impl Store {
         role: Role,
         label: &str,
     ) -> Result<(Client, ApiKey), StorageError> {
+        self.create_client_until(organisation, role, label, None).await
+    }
+
+    /// Like [`Store::create_client`]; the key ends at a time, when one is given.
+    ///
+    /// # Errors
+    /// `NotFound` when the organisation does not exist.
+    pub async fn create_client_until(
+        &self,
+        organisation: OrganisationId,
+        role: Role,
+        label: &str,
+        expires_at: Option<OffsetDateTime>,
+    ) -> Result<(Client, ApiKey), StorageError> {
         let mut transaction = self.begin().await?;
-        let made = insert(&mut transaction, organisation, role, label, self.now()).await?;
+        let made = insert(&mut transaction, organisation, role, label, expires_at, self.now()).await?;
         transaction.commit().await?;
         Ok(made)
     }
@@ -178,56 +229,72 @@ impl Store {
             Some(id) => id,
             None => organisations::insert(&mut transaction, FIRST_ORGANISATION, now).await?.id,
         };
-        let (_, key) = insert(&mut transaction, organisation, Role::Admin, "first admin", now).await?;
+        let (_, key) = insert(&mut transaction, organisation, Role::Admin, "first admin", None, now).await?;
         transaction.commit().await?;
         Ok(Some(key))
     }
 
-    /// Whose key this is; `None` for an unknown or revoked key.
+    /// Whose valid key this is; `None` for every other.
     ///
     /// # Errors
     /// When the database fails.
     pub async fn client_of_key(&self, key: &ApiKey) -> Result<Option<Client>, StorageError> {
+        Ok(match self.holder_of_key(key).await? {
+            KeyHolder::Valid(client) => Some(client),
+            KeyHolder::Expired | KeyHolder::Unknown => None,
+        })
+    }
+
+    /// Whose key this is, and whether it still opens.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn holder_of_key(&self, key: &ApiKey) -> Result<KeyHolder, StorageError> {
         let digest = key.digest();
         let now = self.now();
-        let changes = match self.known_keys.look_up(&digest) {
-            Known::Client(client) if client.was_used_lately(now) => return Ok(Some(client)),
+        let changes = match self.known_keys.look_up(&digest, now) {
+            Known::Client(client) if client.was_used_lately(now) => return Ok(KeyHolder::Valid(client)),
             Known::Client(_) => self.known_keys.changes(),
             Known::Nothing { changes } => changes,
         };
         // Comparing digests in the index leaks at most a prefix of a digest, from which no key can be made.
-        let row = query("SELECT * FROM clients WHERE key_sha256 = $1 AND revoked_at IS NULL")
-            .bind(&digest[..])
-            .fetch_optional(self.reader())
-            .await?;
-        let Some(mut client) = row.as_ref().map(client_from_row).transpose()? else { return Ok(None) };
+        let row =
+            query("SELECT * FROM clients WHERE revoked_at IS NULL AND (key_sha256 = $1 OR previous_key_sha256 = $1)")
+                .bind(&digest[..])
+                .fetch_optional(self.reader())
+                .await?;
+        let Some(row) = row else { return Ok(KeyHolder::Unknown) };
+        let mut client = client_from_row(&row)?;
+        let is_newest = row.try_get::<&[u8]>("key_sha256")? == digest;
+        let overlap = if is_newest { None } else { client.previous_key_until };
+        let valid_until = [client.expires_at, overlap].into_iter().flatten().min();
+        if valid_until.is_some_and(|end| end <= now) {
+            return Ok(KeyHolder::Expired);
+        }
         if !client.was_used_lately(now) {
             self.note_use(client.id, now).await?;
             client.last_used_at = Some(now);
         }
-        self.known_keys.remember(digest, &client, changes);
-        Ok(Some(client))
+        self.known_keys.remember(digest, &client, valid_until, changes);
+        Ok(KeyHolder::Valid(client))
     }
 
-    async fn note_use(&self, client: ClientId, now: OffsetDateTime) -> Result<(), StorageError> {
+    pub(super) async fn note_use(&self, client: ClientId, now: OffsetDateTime) -> Result<(), StorageError> {
         let mut transaction = self.begin().await?;
-        query(
-            "UPDATE clients SET last_used_at = $2
-                     WHERE id = $1 AND (last_used_at IS NULL OR last_used_at < $2)",
-        )
-        .bind(client)
-        .bind(ms_from_time(now))
-        .execute(&mut transaction)
-        .await?;
+        query("UPDATE clients SET last_used_at = $2 WHERE id = $1 AND (last_used_at IS NULL OR last_used_at < $2)")
+            .bind(client)
+            .bind(ms_from_time(now))
+            .execute(&mut transaction)
+            .await?;
         Ok(transaction.commit().await?)
     }
 
-    /// The clients of the organisation, oldest first, revoked ones too.
+    /// The holders of keys of the organisation, oldest first, revoked ones too; users are others' question.
     ///
     /// # Errors
     /// When the database fails.
     pub async fn clients(&self, organisation: OrganisationId) -> Result<Vec<Client>, StorageError> {
-        let rows = query("SELECT * FROM clients WHERE organisation_id = $1 ORDER BY id")
+        let rows = query("SELECT * FROM clients WHERE organisation_id = $1 AND kind = 'key' ORDER BY id")
             .bind(organisation)
             .fetch_all(self.reader())
             .await?;
@@ -241,7 +308,8 @@ impl Store {
     pub async fn revoke_client(&self, organisation: OrganisationId, id: ClientId) -> Result<Client, StorageError> {
         let mut transaction = self.begin().await?;
         let row = query(
-            "UPDATE clients SET revoked_at = coalesce(revoked_at, $3) WHERE id = $1 AND organisation_id = $2 RETURNING *",
+            "UPDATE clients SET revoked_at = coalesce(revoked_at, $3)
+             WHERE id = $1 AND organisation_id = $2 AND kind = 'key' RETURNING *",
         )
         .bind(id)
         .bind(organisation)
@@ -252,5 +320,53 @@ impl Store {
         transaction.commit().await?;
         self.known_keys.forget_all();
         client_from_row(&row)
+    }
+
+    /// Replaces a client's key. The client stays who it is, with all that it has made; the key before ends at once, or after
+    /// the overlap, or when it would have ended anyway. A key that an earlier rotation still left open ends now.
+    ///
+    /// # Errors
+    /// `NotFound` when the organisation has no such client; `Conflict` with code `client_revoked`, or `key_expired` when no
+    /// later end is given for a key that has come to its end.
+    pub async fn rotate_client(
+        &self,
+        organisation: OrganisationId,
+        id: ClientId,
+        rotation: Rotation,
+    ) -> Result<(Client, ApiKey), StorageError> {
+        let conflict = |code, sentence: &str| StorageError::Conflict { code, sentence: sentence.to_owned() };
+        let now = self.now();
+        let mut transaction = self.begin().await?;
+        let row = query("SELECT * FROM clients WHERE id = $1 AND organisation_id = $2 AND kind = 'key'")
+            .bind(id)
+            .bind(organisation)
+            .fetch_optional(&mut transaction)
+            .await?
+            .ok_or(StorageError::not_found("client"))?;
+        let before = client_from_row(&row)?;
+        if before.revoked_at.is_some() {
+            return Err(conflict("client_revoked", "The key was revoked. Make a new client instead."));
+        }
+        let expires_at = rotation.expires_at.or(before.expires_at);
+        if expires_at.is_some_and(|end| end <= now) {
+            return Err(conflict("key_expired", "The key has come to its end. Say when the new one is to end."));
+        }
+        let overlap_ends = now + rotation.overlap;
+        let previous_until = before.expires_at.map_or(overlap_ends, |end| end.min(overlap_ends));
+        let key = ApiKey::generate()?;
+        let row = query(
+            "UPDATE clients SET previous_key_sha256 = key_sha256, previous_key_until = $4, key_sha256 = $3, expires_at = $5
+             WHERE id = $1 AND organisation_id = $2 RETURNING *",
+        )
+        .bind(id)
+        .bind(organisation)
+        .bind(&key.digest()[..])
+        .bind(ms_from_time(previous_until))
+        .bind(expires_at.map(ms_from_time))
+        .fetch_one(&mut transaction)
+        .await?;
+        transaction.commit().await?;
+        self.known_keys.forget_all();
+        Ok((client_from_row(&row)?, key))
     }
 }

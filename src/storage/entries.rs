@@ -1,6 +1,7 @@
 //! What people enter about a patient: answers, results of tests, training plans. Rows are added and never changed; of answers
 //! and plans the newest counts as a whole.
 
+use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Column, Row, query};
 use super::{
@@ -82,13 +83,16 @@ macro_rules! entries {
                 let rows = query(concat!(
                     "SELECT * FROM ",
                     $table,
-                    " WHERE organisation_id = $1 AND patient_id = $2 AND id < $3
-                     ORDER BY id DESC LIMIT $4",
+                    " WHERE patient_id = $2 AND id < $3 AND (organisation_id = $1 OR ",
+                    shared_with!("patient_id", "$5", "$6"),
+                    ") ORDER BY id DESC LIMIT $4",
                 ))
                 .bind(access.organisation)
                 .bind(patient)
                 .bind(page.cursor())
                 .bind(page.rows())
+                .bind(access.receiver())
+                .bind(ms_from_time(self.now()))
                 .fetch_all(self.reader())
                 .await?;
                 let entries = rows.iter().map(|row| entry_from_row(row, row::json(row, $column)?));
@@ -108,12 +112,15 @@ macro_rules! entries {
                 let row = query(concat!(
                     "SELECT * FROM ",
                     $table,
-                    " WHERE organisation_id = $1 AND patient_id = $2 AND created_at <= $3
-                     ORDER BY id DESC LIMIT 1",
+                    " WHERE patient_id = $2 AND created_at <= $3 AND (organisation_id = $1 OR ",
+                    shared_with!("patient_id", "$4", "$5"),
+                    ") ORDER BY id DESC LIMIT 1",
                 ))
                 .bind(access.organisation)
                 .bind(patient)
                 .bind(ms_from_time(by))
+                .bind(access.receiver())
+                .bind(ms_from_time(self.now()))
                 .fetch_optional(self.reader())
                 .await?;
                 row.map(|row| entry_from_row(&row, row::json(&row, $column)?)).transpose()
@@ -178,14 +185,17 @@ impl Store {
         page: &PageRequest<MeasurementId>,
     ) -> Result<Page<Entry<MeasurementId, Occasion>, MeasurementId>, StorageError> {
         self.patient(access, patient).await?;
-        let rows = query(
-            "SELECT * FROM measurements WHERE organisation_id = $1 AND patient_id = $2 AND id < $3
-             ORDER BY id DESC LIMIT $4",
-        )
+        let rows = query(concat!(
+            "SELECT * FROM measurements WHERE patient_id = $2 AND id < $3 AND (organisation_id = $1 OR ",
+            shared_with!("patient_id", "$5", "$6"),
+            ") ORDER BY id DESC LIMIT $4"
+        ))
         .bind(access.organisation)
         .bind(patient)
         .bind(page.cursor())
         .bind(page.rows())
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_all(self.reader())
         .await?;
         let occasions = rows.iter().map(occasion_from_row).collect::<Result<_, _>>()?;

@@ -80,6 +80,8 @@ ids! {
     MeasurementId;
     /// Identity of a measure: one value, by an assessment or of a measurement.
     MeasureId;
+    /// Identity of a share: one patient, one clinician, one time.
+    ShareId;
     /// Identity of a training plan: what a patient is to train at home.
     TrainingPlanId;
 }

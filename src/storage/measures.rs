@@ -3,6 +3,7 @@
 //! Of the assessments of one recording the newest counts: what an earlier one measured stays, and is seen again when one
 //! asks for what was known at an earlier time.
 
+use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Row, Transaction, query};
 use super::{
@@ -140,12 +141,18 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn measure(&self, access: &Access, id: MeasureId) -> Result<(MeasureRecord, PatientId), StorageError> {
-        let row = query("SELECT * FROM measures WHERE organisation_id = $1 AND id = $2")
-            .bind(access.organisation)
-            .bind(id)
-            .fetch_optional(self.reader())
-            .await?
-            .ok_or(StorageError::not_found("measure"))?;
+        let row = query(concat!(
+            "SELECT * FROM measures WHERE id = $2 AND (organisation_id = $1 OR ",
+            shared_with!("patient_id", "$3", "$4"),
+            ")"
+        ))
+        .bind(access.organisation)
+        .bind(id)
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("measure"))?;
         Ok((measure_from_row(&row)?, row.try_get("patient_id")?))
     }
 
@@ -160,7 +167,9 @@ impl Store {
         by: OffsetDateTime,
     ) -> Result<Vec<MeasureRecord>, StorageError> {
         let rows = query(concat!(
-            "SELECT found.* FROM measures found WHERE found.organisation_id = $1 AND found.id IN (
+            "SELECT found.* FROM measures found WHERE (found.organisation_id = $1 OR ",
+            shared_with!("found.patient_id", "$4", "$5"),
+            ") AND found.id IN (
                  SELECT (SELECT m.id FROM measures m
                          WHERE m.patient_id = $2 AND m.name = known.name AND m.side = known.side
                            AND m.definition = known.definition AND m.created_at <= $3
@@ -173,6 +182,8 @@ impl Store {
         .bind(access.organisation)
         .bind(patient)
         .bind(ms_from_time(by))
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_all(self.reader())
         .await?;
         rows.iter().map(measure_from_row).collect()
@@ -193,8 +204,10 @@ impl Store {
     ) -> Result<Vec<MeasureRecord>, StorageError> {
         let rows = query(concat!(
             "SELECT m.* FROM measures m
-             WHERE m.organisation_id = $1 AND m.patient_id = $2 AND m.created_at <= $3 AND m.name = $4 AND m.side = $5
-               AND m.definition = $7 AND ",
+             WHERE m.patient_id = $2 AND m.created_at <= $3 AND m.name = $4 AND m.side = $5 AND m.definition = $7
+               AND (m.organisation_id = $1 OR ",
+            shared_with!("m.patient_id", "$8", "$9"),
+            ") AND ",
             not_replaced!(),
             " ORDER BY m.measured_at DESC, m.id DESC LIMIT $6"
         ))
@@ -205,6 +218,8 @@ impl Store {
         .bind(like.side.map_or("", Side::name))
         .bind(most)
         .bind(like.definition.as_deref().unwrap_or_default())
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_all(self.reader())
         .await?;
         rows.iter().rev().map(measure_from_row).collect()
@@ -222,13 +237,15 @@ impl Store {
         page: &PageRequest<MeasureId>,
     ) -> Result<Page<MeasureRecord, MeasureId>, StorageError> {
         self.patient(access, patient).await?;
-        let rows = query(
+        let rows = query(concat!(
             "SELECT m.* FROM measures m
-             WHERE m.organisation_id = $1 AND m.patient_id = $2 AND m.id < $3 AND ($4 IS NULL OR m.name = $4)
+             WHERE (m.organisation_id = $1 OR ",
+            shared_with!("m.patient_id", "$9", "$10"),
+            ") AND m.patient_id = $2 AND m.id < $3 AND ($4 IS NULL OR m.name = $4)
                AND ($5 IS NULL OR m.session_id = $5)
                AND ($7 IS NULL OR m.measured_at >= $7) AND ($8 IS NULL OR m.measured_at < $8)
-             ORDER BY m.id DESC LIMIT $6",
-        )
+             ORDER BY m.id DESC LIMIT $6"
+        ))
         .bind(access.organisation)
         .bind(patient)
         .bind(page.cursor())
@@ -237,6 +254,8 @@ impl Store {
         .bind(page.rows())
         .bind(filter.measured[0].map(ms_from_time))
         .bind(filter.measured[1].map(ms_from_time))
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_all(self.reader())
         .await?;
         let measures = rows.iter().map(measure_from_row).collect::<Result<_, _>>()?;

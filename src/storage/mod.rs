@@ -37,18 +37,21 @@ pub mod recordings;
 pub(crate) mod row;
 pub mod series;
 pub mod sessions;
+pub mod shares;
+pub mod sign_in_failures;
+pub mod users;
 
 pub use access::Access;
 pub use assessments::{AssessmentFilter, StoredAssessment};
 pub use backup::{Ailment, BackupManifest, restore};
 pub use blobs::{BlobReader, BlobStore, BlobWriter, SealedBlob, StoredBlob};
-pub use clients::{ApiKey, Client, Role};
+pub use clients::{ApiKey, Client, KeyHolder, Role, Rotation};
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use entries::{Entry, Occasion};
 pub use error::StorageError;
 pub use id::{
     AssessmentId, ClientId, JobId, MeasureId, MeasurementId, NoiseModelId, OrganisationId, PatientId, QuestionnaireId,
-    RecordingId, SessionId, TrainingPlanId,
+    RecordingId, SessionId, ShareId, TrainingPlanId,
 };
 pub use idempotency::StoredResponse;
 pub use measures::MeasureFilter;
@@ -61,15 +64,21 @@ pub use places::Places;
 pub use recordings::{NewRecording, RecordingFilter, StoredRecording};
 pub use series::{Parts, SeriesQuery, SeriesSlice};
 pub use sessions::{NewSession, Session, SessionFilter};
+pub use shares::Share;
+pub use users::{NewUser, Password, Provided, SignIn, User};
 
 use database::{Database, Transaction, query};
 use known_keys::KnownKeys;
 use std::path::Path;
 use std::sync::Arc;
 use time::OffsetDateTime;
+use tokio::sync::Semaphore;
 
 /// Name of the database file in the data directory.
 const DATABASE_FILE: &str = "surefoot.sqlite";
+/// Passwords that are looked at or changed at the same time.
+const PASSWORDS_AT_ONCE: usize = 2;
+
 /// The database and the blobs of one data directory. A clone is another handle to the same.
 #[derive(Debug, Clone)]
 pub struct Store {
@@ -77,6 +86,7 @@ pub struct Store {
     blobs: BlobStore,
     clock: Arc<dyn Clock>,
     known_keys: KnownKeys,
+    password_turns: Arc<Semaphore>,
 }
 
 impl Store {
@@ -103,7 +113,8 @@ impl Store {
     pub async fn open_at(places: &Places, clock: Arc<dyn Clock>) -> Result<Self, StorageError> {
         let blobs = places.open_blobs().await?;
         let database = places.open_database().await?;
-        Ok(Self { database, blobs, clock, known_keys: KnownKeys::default() })
+        let password_turns = Arc::new(Semaphore::new(PASSWORDS_AT_ONCE));
+        Ok(Self { database, blobs, clock, known_keys: KnownKeys::default(), password_turns })
     }
 
     /// The blobs.

@@ -77,16 +77,28 @@ impl Store {
         Ok(token)
     }
 
-    /// Who is signed in with this token; none when the session is over or the client's key was revoked.
+    /// Who is signed in with this token; none when the session is over, the client's key was revoked or has expired, or the client is a
+    /// user who has to change the password first.
     ///
     /// # Errors
     /// When the database fails.
     pub async fn client_of_page_session(&self, token: &PageToken) -> Result<Option<Client>, StorageError> {
+        let Some(client) = self.client_behind_page_session(token).await? else { return Ok(None) };
+        let waits: i64 = query("SELECT count(*) FROM users WHERE id = $1 AND must_change_password = 1")
+            .bind(client.id)
+            .fetch_value(self.reader())
+            .await?;
+        Ok((waits == 0).then_some(client))
+    }
+
+    /// Whose session this is, whatever has to be done first.
+    pub(super) async fn client_behind_page_session(&self, token: &PageToken) -> Result<Option<Client>, StorageError> {
         let now = self.now();
         let row = query(
             "SELECT c.*, p.last_used_at AS page_used_at
              FROM page_sessions p JOIN clients c ON c.id = p.client_id
-             WHERE p.token_sha256 = $1 AND p.expires_at > $2 AND p.last_used_at > $3 AND c.revoked_at IS NULL",
+             WHERE p.token_sha256 = $1 AND p.expires_at > $2 AND p.last_used_at > $3 AND c.revoked_at IS NULL
+               AND (c.expires_at IS NULL OR c.expires_at > $2)",
         )
         .bind(&token.digest()[..])
         .bind(ms_from_time(now))

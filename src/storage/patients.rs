@@ -1,5 +1,6 @@
 //! Patients, known by pseudonym only.
 
+use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Row, query};
 use super::{Access, Page, PageRequest, PatientId, StorageError, Store, row};
@@ -158,17 +159,23 @@ impl Store {
         patient_from_row(&row)
     }
 
-    /// One patient of the organisation.
+    /// One patient of the organisation, or one that is shared with the caller.
     ///
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn patient(&self, access: &Access, id: PatientId) -> Result<Patient, StorageError> {
-        let row = query("SELECT * FROM patients WHERE organisation_id = $1 AND id = $2")
-            .bind(access.organisation)
-            .bind(id)
-            .fetch_optional(self.reader())
-            .await?
-            .ok_or(StorageError::not_found("patient"))?;
+        let row = query(concat!(
+            "SELECT * FROM patients WHERE id = $2 AND (organisation_id = $1 OR ",
+            shared_with!("id", "$3", "$4"),
+            ")"
+        ))
+        .bind(access.organisation)
+        .bind(id)
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("patient"))?;
         patient_from_row(&row)
     }
 

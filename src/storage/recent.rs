@@ -1,5 +1,6 @@
 //! What a patient did lately: sessions, their recordings, and what came of each.
 
+use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Row, dialects, query};
 use super::id::list_of_ids;
@@ -48,7 +49,9 @@ impl Store {
                     "SELECT s.id, s.started_at, s.protocol, r.id AS recording_id, j.state, a.id AS assessment_id, a.pipeline,
                             a.performance, ",
                     $in_json,
-                    " FROM (SELECT * FROM sessions WHERE organisation_id = $1 AND patient_id = $2 AND created_at <= $3
+                    " FROM (SELECT * FROM sessions WHERE patient_id = $2 AND created_at <= $3 AND (organisation_id = $1 OR ",
+                    shared_with!("patient_id", "$5", "$6"),
+                    ")
                             ORDER BY started_at DESC, id DESC LIMIT $4) s
                            LEFT JOIN recordings r ON r.session_id = s.id AND r.created_at <= $3
                            LEFT JOIN jobs j ON j.id = (SELECT id FROM jobs WHERE recording_id = r.id AND queued_at <= $3
@@ -78,6 +81,8 @@ impl Store {
         .bind(patient)
         .bind(ms_from_time(by))
         .bind(most)
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_all(self.reader())
         .await?;
         let mut sessions: Vec<RecentSession> = Vec::new();
@@ -115,9 +120,10 @@ impl Store {
                            LEFT JOIN assessments a ON a.id = (SELECT id FROM assessments
                                                               WHERE recording_id = r.id AND created_at <= $4
                                                               ORDER BY id DESC LIMIT 1)
-                      WHERE s.organisation_id = $1 AND s.patient_id = $2 AND s.started_at BETWEEN $3 AND $4
-                        AND s.created_at <= $4
-                      ORDER BY s.started_at, s.id, r.id"
+                      WHERE s.patient_id = $2 AND s.started_at BETWEEN $3 AND $4 AND s.created_at <= $4
+                        AND (s.organisation_id = $1 OR ",
+                    shared_with!("s.patient_id", "$5", "$6"),
+                    ") ORDER BY s.started_at, s.id, r.id"
                 )
             };
         }
@@ -138,6 +144,8 @@ impl Store {
         .bind(patient)
         .bind(ms_from_time(from))
         .bind(ms_from_time(by))
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_all(self.reader())
         .await?;
         let mut sessions: Vec<(Uuid, TrainedSession)> = Vec::new();
@@ -155,7 +163,7 @@ impl Store {
         Ok(sessions.into_iter().map(|(_, session)| session).collect())
     }
 
-    /// What assessments of the organisation rest on, in the order of the ids.
+    /// What assessments within the caller's reach rest on, in the order of the ids.
     ///
     /// # Errors
     /// When the database fails.
@@ -167,10 +175,13 @@ impl Store {
         macro_rules! origins {
             ($ids:literal) => {
                 concat!(
-                    "SELECT id, recording_id, created_at, provenance FROM assessments
-                     WHERE organisation_id = $1 AND id IN (",
+                    "SELECT a.id, a.recording_id, a.created_at, a.provenance
+                     FROM assessments a JOIN recordings r ON r.id = a.recording_id JOIN sessions s ON s.id = r.session_id
+                     WHERE a.id IN (",
                     $ids,
-                    ") ORDER BY id"
+                    ") AND (a.organisation_id = $1 OR ",
+                    shared_with!("s.patient_id", "$3", "$4"),
+                    ") ORDER BY a.id"
                 )
             };
         }
@@ -180,6 +191,8 @@ impl Store {
         })
         .bind(access.organisation)
         .bind(list_of_ids(ids.iter().map(|id| id.0)))
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_all(self.reader())
         .await?;
         let origin = |row: &Row| {

@@ -1,5 +1,6 @@
 //! Recordings: one upload in a session. The bytes are a blob; the row says which, and what is in it.
 
+use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Row, Transaction, dialects, query};
 use super::{
@@ -108,20 +109,24 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn recording(&self, access: &Access, id: RecordingId) -> Result<StoredRecording, StorageError> {
-        let row = query(
+        let row = query(concat!(
             "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
-             WHERE r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2) AND r.id = $3",
-        )
+             WHERE r.id = $3 AND ((r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)) OR ",
+            shared_with!("s.patient_id", "$4", "$5"),
+            ")"
+        ))
         .bind(access.organisation)
         .bind(access.only_sessions_of())
         .bind(id)
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
         .fetch_optional(self.reader())
         .await?
         .ok_or(StorageError::not_found("recording"))?;
         recording_from_row(&row)
     }
 
-    /// The recordings within the caller's reach, newest first.
+    /// The recordings within the caller's reach, newest first; those of a shared patient when it or its session is asked for.
     ///
     /// # Errors
     /// When the database fails.
@@ -133,31 +138,41 @@ impl Store {
     ) -> Result<Page<StoredRecording, RecordingId>, StorageError> {
         // An index can serve a condition only if it is there whatever is bound, hence one text per case.
         macro_rules! recordings_where {
-            ($session:literal) => {
+            ($($reach:expr),+) => {
                 concat!(
                     "SELECT r.*, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
-                     WHERE r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)
-                       AND r.id < $3
-                       AND ($5 IS NULL OR s.patient_id = $5)
-                       AND ",
-                    $session,
+                     WHERE r.id < $3 AND ($5 IS NULL OR s.patient_id = $5) AND ",
+                    $($reach,)+
                     " ORDER BY r.id DESC LIMIT $6"
                 )
             };
         }
-        let question = match filter.session_id {
-            Some(_) => recordings_where!("r.session_id = $4"),
-            None => recordings_where!("$4 IS NULL"),
+        let question = match (filter.session_id, filter.patient_id) {
+            (Some(_), _) => recordings_where!(
+                "r.session_id = $4 AND ((r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)) OR ",
+                shared_with!("s.patient_id", "$7", "$8"),
+                ")"
+            ),
+            (None, Some(_)) => recordings_where!(
+                "$4 IS NULL AND ((r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)) OR ",
+                shared_with!("s.patient_id", "$7", "$8"),
+                ")"
+            ),
+            (None, None) => {
+                recordings_where!("$4 IS NULL AND r.organisation_id = $1 AND ($2 IS NULL OR s.created_by = $2)")
+            }
         };
-        let rows = query(question)
+        let mut question = query(question)
             .bind(access.organisation)
             .bind(access.only_sessions_of())
             .bind(page.cursor())
             .bind(filter.session_id)
             .bind(filter.patient_id)
-            .bind(page.rows())
-            .fetch_all(self.reader())
-            .await?;
+            .bind(page.rows());
+        if filter.session_id.is_some() || filter.patient_id.is_some() {
+            question = question.bind(access.receiver()).bind(ms_from_time(self.now()));
+        }
+        let rows = question.fetch_all(self.reader()).await?;
         let recordings = rows.iter().map(recording_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(recordings, page, |recording| recording.id))
     }

@@ -1,5 +1,6 @@
 //! Sessions: one sitting of a patient at home.
 
+use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Row, dialects, query};
 use super::id::list_of_ids;
@@ -103,14 +104,20 @@ impl Store {
     /// # Errors
     /// `NotFound` when there is none.
     pub async fn session(&self, access: &Access, id: SessionId) -> Result<Session, StorageError> {
-        let row =
-            query("SELECT * FROM sessions WHERE organisation_id = $1 AND ($2 IS NULL OR created_by = $2) AND id = $3")
-                .bind(access.organisation)
-                .bind(access.only_sessions_of())
-                .bind(id)
-                .fetch_optional(self.reader())
-                .await?
-                .ok_or(StorageError::not_found("session"))?;
+        let row = query(concat!(
+            "SELECT * FROM sessions
+             WHERE id = $3 AND ((organisation_id = $1 AND ($2 IS NULL OR created_by = $2)) OR ",
+            shared_with!("patient_id", "$4", "$5"),
+            ")"
+        ))
+        .bind(access.organisation)
+        .bind(access.only_sessions_of())
+        .bind(id)
+        .bind(access.receiver())
+        .bind(ms_from_time(self.now()))
+        .fetch_optional(self.reader())
+        .await?
+        .ok_or(StorageError::not_found("session"))?;
         session_from_row(&row)
     }
 
@@ -144,7 +151,7 @@ impl Store {
         rows.iter().map(|row| Ok((row.try_get("patient_id")?, row::time(row, "started_at")?))).collect()
     }
 
-    /// The sessions within the caller's reach, newest first.
+    /// The sessions within the caller's reach, newest first; those of a shared patient when it is asked for.
     ///
     /// # Errors
     /// When the database fails.
@@ -156,26 +163,29 @@ impl Store {
     ) -> Result<Page<Session, SessionId>, StorageError> {
         // An index can serve a condition only if it is there whatever is bound, hence one text per case.
         macro_rules! sessions_where {
-            ($indexed:literal) => {
+            ($($indexed:expr),+) => {
                 concat!(
                     "SELECT * FROM sessions
-                     WHERE organisation_id = $1
-                       AND id < $3
+                     WHERE id < $3
                        AND ($5 IS NULL OR started_at >= $5)
                        AND ($6 IS NULL OR started_at < $6)
                        AND ($7 IS NULL OR protocol = $7)
                        AND ",
-                    $indexed,
+                    $($indexed,)+
                     " ORDER BY id DESC LIMIT $8"
                 )
             };
         }
         let question = match (filter.patient_id, access.only_sessions_of()) {
-            (Some(_), _) => sessions_where!("patient_id = $4 AND ($2 IS NULL OR created_by = $2)"),
-            (None, Some(_)) => sessions_where!("created_by = $2 AND $4 IS NULL"),
-            (None, None) => sessions_where!("$2 IS NULL AND $4 IS NULL"),
+            (Some(_), _) => sessions_where!(
+                "patient_id = $4 AND ((organisation_id = $1 AND ($2 IS NULL OR created_by = $2)) OR ",
+                shared_with!("patient_id", "$9", "$10"),
+                ")"
+            ),
+            (None, Some(_)) => sessions_where!("organisation_id = $1 AND created_by = $2 AND $4 IS NULL"),
+            (None, None) => sessions_where!("organisation_id = $1 AND $2 IS NULL AND $4 IS NULL"),
         };
-        let rows = query(question)
+        let mut question = query(question)
             .bind(access.organisation)
             .bind(access.only_sessions_of())
             .bind(page.cursor())
@@ -183,9 +193,11 @@ impl Store {
             .bind(filter.started_from.map(ms_from_time))
             .bind(filter.started_before.map(ms_from_time))
             .bind(&filter.protocol)
-            .bind(page.rows())
-            .fetch_all(self.reader())
-            .await?;
+            .bind(page.rows());
+        if filter.patient_id.is_some() {
+            question = question.bind(access.receiver()).bind(ms_from_time(self.now()));
+        }
+        let rows = question.fetch_all(self.reader()).await?;
         let sessions = rows.iter().map(session_from_row).collect::<Result<_, _>>()?;
         Ok(Page::from_rows(sessions, page, |session| session.id))
     }

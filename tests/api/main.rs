@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
 
 mod assessments;
+mod authorisation;
 mod clients;
 mod events;
 mod fall_risk;
@@ -12,14 +13,18 @@ mod health;
 mod jobs;
 mod leg_pose;
 mod noise_models;
+mod oidc;
 mod patient_calibration;
 mod patients;
 mod performance;
 mod problems;
+mod rates;
 mod recordings;
 mod report;
 mod series;
 mod serving;
 mod sessions;
+mod shares;
 mod support;
 mod upload_defects;
+mod users;

@@ -9,7 +9,7 @@ use surefoot::body::Joint;
 use surefoot::fall_risk::Answers;
 use surefoot::progress::Monitor;
 use surefoot::recording::decode::{DepthReader, Format, Inspector, Limits, decode};
-use surefoot::recording::depth::DepthImage;
+use surefoot::recording::depth::{DepthImage, DepthUnit};
 use surefoot::recording::import::{CameraFile, RawImages};
 use surefoot::recording::{Header, Recording, SkeletonRecording, encode};
 use surefoot::report::TrainingPlan;
@@ -97,8 +97,7 @@ fn read_depth(bytes: &[u8]) -> bool {
         return false;
     }
     let Ok(mut reader) = DepthReader::open(bytes, &limits()) else { return false };
-    let Some(calibration) = reader.calibration().cloned() else { return false };
-    let mut image = DepthImage::missing(calibration.width, calibration.height, calibration.unit);
+    let mut image = DepthImage::missing(1, 1, DepthUnit::Millimetres);
     loop {
         match reader.next_into(&mut image) {
             Ok(Some(_)) => {}

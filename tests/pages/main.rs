@@ -7,3 +7,4 @@ mod browser;
 mod reading;
 mod sign_in;
 mod support;
+mod users;

@@ -98,6 +98,33 @@ impl Clinic {
         self.send(Method::POST, "/app/sign-in", &headers, format!("key={key}&next=%2Fapp%2Fpatients")).await
     }
 
+    /// Sends a form of a page as a browser does.
+    pub async fn form(&self, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
+        self.form_from(std::net::SocketAddr::from(([127, 0, 0, 1], 1)), path, headers, body).await
+    }
+
+    /// Sends a form over a connection from an address.
+    pub async fn form_from(
+        &self,
+        from: std::net::SocketAddr,
+        path: &str,
+        headers: &[(&str, &str)],
+        body: &str,
+    ) -> Answer {
+        let mut request = Request::builder().method(Method::POST).uri(path).extension(axum::extract::ConnectInfo(from));
+        request = request.header("content-type", "application/x-www-form-urlencoded");
+        if !headers.iter().any(|(name, _)| *name == "sec-fetch-site") {
+            request = request.header("sec-fetch-site", "same-origin");
+        }
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        let response = self.router.clone().oneshot(request.body(Body::from(body.to_owned())).unwrap()).await.unwrap();
+        let (parts, body) = response.into_parts();
+        let body = axum::body::to_bytes(body, usize::MAX).await.unwrap();
+        Answer { status: parts.status, headers: parts.headers, body: String::from_utf8_lossy(&body).into_owned() }
+    }
+
     /// The cookie of a new session, as a browser sends it back.
     pub async fn cookie_of(&self, key: &str) -> String {
         let answer = self.sign_in(key, &[]).await;

@@ -103,7 +103,7 @@ async function inLight() {
   await accessible(page, "sign-in");
   await page.keyboard.press("Tab");
   check(await page.evaluate(() => document.activeElement.className === "skip"), "the first key press offers to skip to the content");
-  for (let i = 0; i < 5 && (await page.evaluate(() => document.activeElement.id)) !== "key"; i += 1) await page.keyboard.press("Tab");
+  for (let i = 0; i < 8 && (await page.evaluate(() => document.activeElement.id)) !== "key"; i += 1) await page.keyboard.press("Tab");
   await page.keyboard.type("surefoot_wrong");
   await page.keyboard.press("Enter");
   await page.waitForSelector("[role=alert]");

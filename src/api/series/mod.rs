@@ -132,6 +132,7 @@ pub struct ChannelResponse {
 /// Value and credible interval of the chosen channels over the chosen time. CSV has one row per sample and, per
 /// channel, the columns `name`, `name_low`, `name_high`, `name_flags`; an empty cell is no number.
 #[utoipa::path(get, path = "/v1/assessments/{id}/series", tag = "assessments", operation_id = "read_series",
+    security(("api_key" = ["device"])),
     params(SeriesPath, SeriesParameters),
     responses((status = 200, description = "The samples", content(
                 (SeriesResponse = "application/json"), (String = "text/csv"))),

@@ -57,6 +57,7 @@ pub struct UploadResponse {
 /// upload again: the first answer is repeated and nothing is stored twice. Without one, a second upload is a second
 /// recording.
 #[utoipa::path(post, path = "/v1/sessions/{id}/recordings", tag = "recordings", operation_id = "upload_recording",
+    security(("api_key" = ["device"])),
     params(SessionPath,
         ("Content-Digest" = Option<String>, Header, description = "SHA-256 of the body (RFC 9530)",
             pattern = "^(sha-256=:[A-Za-z0-9+/]{42}[AEIMQUYcgkosw048]=:)?$"),
@@ -75,7 +76,7 @@ async fn upload_recording(
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, ApiError> {
-    let session = state.store.session(&caller.access, path.id).await?;
+    let session = state.store.session(&caller.access.own(), path.id).await?;
     state.queue.room(&caller.access).await?.map_err(ApiError::Crowded)?;
     let announced = Announced::from_headers(&headers)?;
     let arrived = arrival::receive(&state, &announced, body).await?;

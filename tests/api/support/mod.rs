@@ -15,7 +15,7 @@ use surefoot::api::{self, AppState};
 use surefoot::cli::serve::recording_limits;
 use surefoot::config::Config;
 use surefoot::queue::{Queue, QueueSettings};
-use surefoot::storage::{Client, Role, Store};
+use surefoot::storage::{Client, Clock, Role, Store, SystemClock};
 use surefoot::worker::{Assess, Ran, Worker};
 use tempfile::TempDir;
 use tokio_util::sync::CancellationToken;
@@ -36,9 +36,13 @@ impl TestApp {
     }
 
     pub async fn with_config(config: Config) -> Self {
+        Self::with_clock(config, Arc::new(SystemClock)).await
+    }
+
+    pub async fn with_clock(config: Config, clock: Arc<dyn Clock>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let config = Config { data_dir: folder.path().to_owned(), ..config };
-        let store = Store::open(&config.data_dir).await.unwrap();
+        let store = Store::open_with_clock(&config.data_dir, clock).await.unwrap();
         let admin = store.ensure_first_admin().await.unwrap().expect("an empty database").reveal().to_owned();
         let queue = Queue::new(store, QueueSettings::from(&config));
         let limits = recording_limits(&config);
@@ -66,7 +70,8 @@ impl TestApp {
         self.key_in(organisation.id, Role::Admin).await.1
     }
 
-    async fn key_in(&self, organisation: surefoot::storage::OrganisationId, role: Role) -> (Client, String) {
+    /// A key of a role in an organisation, and its holder.
+    pub async fn key_in(&self, organisation: surefoot::storage::OrganisationId, role: Role) -> (Client, String) {
         let (client, key) = self.state.store.create_client(organisation, role, role.name()).await.unwrap();
         (client, key.reveal().to_owned())
     }
@@ -157,6 +162,13 @@ impl<'a> Call<'a> {
 
     pub fn without_key(mut self) -> Self {
         self.key = None;
+        self
+    }
+
+    /// Comes over a connection from this address.
+    pub fn from(mut self, address: &str) -> Self {
+        let address: std::net::SocketAddr = address.parse().unwrap();
+        self.request = self.request.extension(axum::extract::ConnectInfo(address));
         self
     }
 
