@@ -10,7 +10,7 @@ use surefoot::body::Joint;
 use surefoot::recording::{Header, Recording, SkeletonRecording, encode};
 
 /// Time for a service to start, and for a queue to be worked off.
-pub const PATIENCE: Duration = Duration::from_secs(240);
+pub const PATIENCE: Duration = Duration::from_secs(900);
 
 /// A number that the environment may set.
 pub fn number(variable: &str, default: u64) -> u64 {
@@ -36,6 +36,7 @@ pub fn surefoot(arguments: &[&str]) -> Command {
         .env("SUREFOOT_LOG", "error")
         .env("SUREFOOT_LEASE_S", "2")
         .env("SUREFOOT_CANARY", "false")
+        .env("SUREFOOT_REQUESTS_PER_MINUTE", "0")
         .env("SUREFOOT_MAX_ATTEMPTS", "1000");
     command
 }

@@ -83,8 +83,12 @@ mod tests {
 
         let store = Store::open(folder.path()).await.unwrap();
         let nobody = uuid::Uuid::nil();
-        let access =
-            Access { organisation: OrganisationId(nobody), client: ClientId(nobody), own_sessions_only: false };
+        let access = Access {
+            organisation: OrganisationId(nobody),
+            client: ClientId(nobody),
+            own_sessions_only: false,
+            reaches_shared: true,
+        };
         let found = store.newest_measures(&access, PatientId(nobody), datetime!(2026-01-01 0:00 UTC)).await.unwrap();
         let values: Vec<_> = found.iter().map(|m| (m.name.as_str(), m.value, m.standard_error)).collect();
         assert_eq!(values, [("timed_up_and_go_s", 9.0, None), ("usual_speed_mps", 1.5, Some(0.1))]);
