@@ -31,7 +31,7 @@ impl ManualClock {
         Self(Arc::new(AtomicI64::new(ms_from_time(time))))
     }
 
-    /// Turns the clock forward.
+    /// Turns the clock forward, or back by a negative duration.
     pub fn advance(&self, by: Duration) {
         self.0.fetch_add(i64::try_from(by.whole_milliseconds()).unwrap_or(i64::MAX), Ordering::SeqCst);
     }

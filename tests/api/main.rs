@@ -6,6 +6,7 @@
 mod assessments;
 mod authorisation;
 mod clients;
+mod crowd;
 mod events;
 mod fall_risk;
 mod fusion;

@@ -4,6 +4,7 @@
 
 mod access;
 mod claiming;
+mod order;
 mod support;
 mod training;
 mod working;

@@ -135,18 +135,20 @@ impl BlobStore {
         self.writer().await.map(drop)
     }
 
-    /// Opens a blob for reading on a blocking thread; it is never in memory as a whole.
+    /// Opens a blob for reading on a blocking thread; it is never in memory as a whole. Whoever reads it to its end learns there
+    /// whether it is what was stored.
     ///
     /// # Errors
     /// When there is no such blob, or the store fails.
     pub async fn reader(&self, blob: &StoredBlob) -> Result<BlobReader, StorageError> {
         let found = self.store.get(&Key::from(blob.key.as_str())).await.map_err(store_error("opening a blob"))?;
-        Ok(BlobReader(match found.payload {
+        let source = match found.payload {
             GetResultPayload::File(file, _) => Source::File(file),
             GetResultPayload::Stream(stream) => {
                 Source::Stream { handle: Handle::current(), stream, chunk: Bytes::new() }
             }
-        }))
+        };
+        Ok(BlobReader { source, check: Some(Check { digest: Sha256::new(), expected: blob.sha256.clone() }) })
     }
 
     /// Keys of all blobs.
@@ -314,7 +316,7 @@ impl SealedBlob {
     /// When the part file cannot be opened.
     pub fn reader(&self) -> Result<BlobReader, StorageError> {
         let file = File::open(&self.part.path).map_err(StorageError::blob("reading a part file"))?;
-        Ok(BlobReader(Source::File(file)))
+        Ok(BlobReader { source: Source::File(file), check: None })
     }
 
     /// Makes it a blob; when this returns, the bytes are on the disk under their name.
@@ -329,7 +331,29 @@ impl SealedBlob {
 }
 
 /// A blob being read. Reads block: use it on a blocking thread.
-pub struct BlobReader(Source);
+pub struct BlobReader {
+    source: Source,
+    check: Option<Check>,
+}
+
+/// The digest of what was read, and what it is to be.
+struct Check {
+    digest: Sha256,
+    expected: String,
+}
+
+impl Check {
+    /// Takes what was read; nothing is the end.
+    fn take(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.digest.update(bytes);
+        if bytes.is_empty() && hex::encode(self.digest.clone().finalize()) != self.expected {
+            return Err(io::Error::other(
+                "the stored bytes are not what was stored: a disk or a person has changed them",
+            ));
+        }
+        Ok(())
+    }
+}
 
 enum Source {
     File(File),
@@ -344,9 +368,19 @@ impl std::fmt::Debug for BlobReader {
 
 impl Read for BlobReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        match &mut self.0 {
-            Source::File(file) => file.read(buffer),
-            Source::Stream { handle, stream, chunk } => {
+        let n = self.source.read(buffer)?;
+        if let Some(check) = self.check.as_mut().filter(|_| !buffer.is_empty()) {
+            check.take(&buffer[..n])?;
+        }
+        Ok(n)
+    }
+}
+
+impl Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.read(buffer),
+            Self::Stream { handle, stream, chunk } => {
                 while chunk.is_empty() {
                     match handle.block_on(stream.next()) {
                         Some(next) => *chunk = next.map_err(io::Error::other)?,

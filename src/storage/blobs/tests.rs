@@ -111,3 +111,14 @@ async fn a_blob_that_is_not_there_is_an_error_and_no_panic() {
     let absent = StoredBlob { key: "00/absent".into(), sha256: "0".repeat(64), size_bytes: 1 };
     assert!(matches!(store.reader(&absent).await, Err(StorageError::Blob { .. })));
 }
+
+#[tokio::test]
+async fn a_blob_that_was_changed_is_noticed_at_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = BlobStore::open(folder.path()).await.unwrap();
+    let blob = store_bytes(&store, &[b"a recording"]).await;
+    fs::write(folder.path().join(BLOB_FOLDER).join(&blob.key), b"A recording").unwrap();
+    let mut reader = store.reader(&blob).await.unwrap();
+    let error = spawn_blocking(move || reader.read_to_end(&mut Vec::new()).unwrap_err()).await.unwrap();
+    assert!(error.to_string().contains("not what was stored"), "{error}");
+}
