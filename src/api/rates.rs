@@ -89,7 +89,9 @@ pub(super) async fn count_strangers(
     let path = request.uri().path();
     let is_watch = path.starts_with("/health/") || path == "/metrics";
     let headers = request.headers();
-    let is_page = path.starts_with("/app/") && !path.starts_with("/app/sign-in");
+    // Sign-in, sign-out and the change of a password take forms of people whom nobody knows yet.
+    let is_form = path.starts_with("/app/sign-") || path == "/app/password";
+    let is_page = path.starts_with("/app/") && !is_form;
     let is_api = path.starts_with("/v1/") || (path.starts_with("/fhir/") && !path.ends_with("/metadata"));
     let will_be_known = (is_api && headers.contains_key(header::AUTHORIZATION))
         || ((is_api || is_page) && headers.contains_key(header::COOKIE));

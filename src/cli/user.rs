@@ -51,7 +51,7 @@ enum Action {
     },
     /// Take a user out of use, at once
     Disable {
-        /// Name at the sign-in.
+        /// Name at the sign-in, or the id of a user of the identity provider.
         name: String,
     },
 }
@@ -120,7 +120,9 @@ async fn act(store: &Store, args: &Args) -> anyhow::Result<()> {
 async fn found(store: &Store, name: &str) -> Result<(OrganisationId, ClientId), StorageError> {
     for organisation in store.organisations().await? {
         let users = store.users(organisation.id).await?;
-        if let Some(user) = users.iter().find(|user| user.name.as_deref() == Some(name)) {
+        if let Some(user) =
+            users.iter().find(|user| user.name.as_deref() == Some(name) || user.client.id.to_string() == name)
+        {
             return Ok((organisation.id, user.client.id));
         }
     }

@@ -126,8 +126,8 @@ async fn with_password(
     sent: &SignInForm,
     from: IpAddr,
 ) -> Result<Result<(ClientId, bool), Refusal>, PageError> {
-    const WRONG: &str = "Name and password do not fit, or the account is disabled. After a few failures there is a wait. An administrator \
-                         can give you a new password.";
+    const WRONG: &str = "Name and password do not fit, or the account is disabled. After a few failures there is a wait. \
+                         An administrator can give you a new password.";
     const LOCKED: &str =
         "Too many sign-ins with this name have failed in a row. An administrator has to give you a new password.";
     let typed = Password::from_text(&sent.password);

@@ -24,6 +24,7 @@ pub mod error;
 pub mod id;
 pub mod idempotency;
 pub mod joint_tracks;
+pub mod key_rotation;
 mod known_keys;
 pub mod measures;
 pub mod noise_models;
@@ -45,7 +46,7 @@ pub use access::Access;
 pub use assessments::{AssessmentFilter, StoredAssessment};
 pub use backup::{Ailment, BackupManifest, restore};
 pub use blobs::{BlobReader, BlobStore, BlobWriter, SealedBlob, StoredBlob};
-pub use clients::{ApiKey, Client, KeyHolder, Role, Rotation};
+pub use clients::{ApiKey, Client, KeyHolder, Role};
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use entries::{Entry, Occasion};
 pub use error::StorageError;
@@ -54,6 +55,7 @@ pub use id::{
     RecordingId, SessionId, ShareId, TrainingPlanId,
 };
 pub use idempotency::StoredResponse;
+pub use key_rotation::Rotation;
 pub use measures::MeasureFilter;
 pub use noise_models::StoredNoiseModel;
 pub use organisations::Organisation;

@@ -127,6 +127,7 @@ impl House {
                     "patient" | "patient_id" => "patients",
                     "session_id" => "sessions",
                     "recording_id" => "recordings",
+                    "form" => return Some("form=csv".to_owned()),
                     other => {
                         assert!(!is_required, "{}: what is `{other}`?", operation.id);
                         return None;
@@ -159,7 +160,9 @@ impl House {
             "create_client" => json!({"role": "device", "label": "another"}),
             "create_user" => user("k.stone"),
             "create_share" => json!({"receiver_id": self.ids["clients"], "expires_at": tomorrow()}),
-            "create_noise_model" => json!({"name": "theirs", "static_recordings": [self.ids["recordings"]]}),
+            "create_noise_model" => {
+                json!({"name": "theirs", "static_recordings": [self.ids["recordings"], self.ids["jobs"]]})
+            }
             "add_questionnaire" => json!({"falls_12_months": 1}),
             "add_measurement" => measurement(),
             "add_training_plan" => json!({"sessions_per_week": 3, "exercises": [{"protocol": "back_knee"}]}),
@@ -190,13 +193,18 @@ fn measurement() -> Value {
     json!({"measured_at": "2026-11-01T10:00:00Z", "measures": {"usual_speed_mps": {"value": 0.9}}})
 }
 
-/// Id of a noise model, trained on a recording that is not assessed.
+/// Id of a noise model, trained on recordings that are not assessed.
 async fn trained_model(app: &TestApp, session: &str) -> String {
-    let upload = app.post(&format!("/v1/sessions/{session}/recordings"));
-    let uploaded = upload.body("application/mcap", samples::standing_still(21, 1)).send().await;
-    let uploaded = uploaded.expect(StatusCode::ACCEPTED);
-    app.post(&format!("/v1/jobs/{}/cancel", text(&uploaded["job"]["id"]))).send().await.expect(StatusCode::ACCEPTED);
-    let request = json!({"name": "ward-3", "static_recordings": [uploaded["recording"]["id"]]});
+    let mut recordings = Vec::new();
+    for seed in [1, 2] {
+        let upload = app.post(&format!("/v1/sessions/{session}/recordings"));
+        let uploaded = upload.body("application/mcap", samples::standing_still(11, seed)).send().await;
+        let uploaded = uploaded.expect(StatusCode::ACCEPTED);
+        let cancel = app.post(&format!("/v1/jobs/{}/cancel", text(&uploaded["job"]["id"])));
+        cancel.send().await.expect(StatusCode::ACCEPTED);
+        recordings.push(uploaded["recording"]["id"].clone());
+    }
+    let request = json!({"name": "ward-3", "static_recordings": recordings});
     let job = app.post("/v1/noise-models").json(&request).send().await.expect(StatusCode::ACCEPTED);
     app.run_pending_jobs().await;
     let job = app.get(&format!("/v1/jobs/{}", text(&job["id"]))).send().await.expect(StatusCode::OK);

@@ -51,7 +51,7 @@ impl Scene {
         let of_patient =
             ["", "/questionnaires", "/measurements", "/training-plans", "/fall-risk", "/measures", "/trends"];
         let of_patient = of_patient.into_iter().chain(["/report", "/fhir-bundle"]);
-        let of_assessment = ["", "/series?max_points=10", "/export?format=csv", "/joints", "/fhir-bundle"];
+        let of_assessment = ["", "/series?max_points=10", "/export?form=csv", "/joints", "/fhir-bundle"];
         let mut paths: Vec<String> = of_patient.map(|rest| format!("/v1/patients/{patient}{rest}")).collect();
         paths.extend(of_assessment.map(|rest| format!("/v1/assessments/{assessment}{rest}")));
         paths.extend([
@@ -179,8 +179,9 @@ async fn a_receiver_changes_nothing_and_sees_no_work() {
     for call in refused {
         call.send().await.refused(404, "not_found");
     }
-    let training = json!({"name": "theirs", "static_recordings": [recording]});
-    post("/v1/noise-models".into(), training).send().await.refused(422, "invalid_body");
+    let training = json!({"name": "theirs", "static_recordings": [recording, session]});
+    let problem = post("/v1/noise-models".into(), training).send().await.refused(422, "invalid_body");
+    assert_eq!(problem["errors"][0]["path"], "static_recordings[0]", "{problem:#}");
 }
 
 #[tokio::test]

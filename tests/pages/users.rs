@@ -2,6 +2,7 @@
 
 use crate::support::{Answer, Clinic};
 use axum::http::StatusCode;
+use surefoot::config::Config;
 use surefoot::storage::{ClientId, NewUser, Role};
 
 const OWN: &str = "a quiet garden path";
@@ -132,4 +133,29 @@ async fn a_receiver_finds_shared_patients_on_the_first_page_and_reads_their_repo
     let page = clinic.get("/app/patients", &cookie).await.body;
     assert!(page.contains("Shared with you") && page.contains("P-77") && page.contains(&report), "{page}");
     assert_eq!(clinic.get(&report, &cookie).await.status, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn who_opens_pages_too_often_is_told_so_on_a_page() {
+    let clinic = Clinic::with_config(Config { requests_per_minute: 2, ..Config::default() }).await;
+    let cookie = clinic.cookie_of(&clinic.key).await;
+    for _ in 0..2 {
+        assert_eq!(clinic.get("/app/patients", &cookie).await.status, StatusCode::OK);
+    }
+    let refused = clinic.get("/app/patients", &cookie).await;
+    assert_eq!(refused.status, StatusCode::TOO_MANY_REQUESTS);
+    let wait: u64 = refused.header("retry-after").parse().unwrap();
+    assert!((1..=31).contains(&wait) && refused.body.contains("<h1>"), "{wait}: {}", refused.body);
+}
+
+#[tokio::test]
+async fn forms_of_strangers_are_counted_whatever_cookie_they_bring() {
+    let clinic = Clinic::with_config(Config { anonymous_requests_per_minute: 2, ..Config::default() }).await;
+    let headers = [("cookie", "surefoot_page=invented")];
+    for _ in 0..2 {
+        assert_eq!(clinic.form("/app/sign-out", &headers, "").await.status, StatusCode::SEE_OTHER);
+    }
+    for path in ["/app/sign-out", "/app/sign-in", "/app/password"] {
+        assert_eq!(clinic.form(path, &headers, "").await.status, StatusCode::TOO_MANY_REQUESTS, "{path}");
+    }
 }

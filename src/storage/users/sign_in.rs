@@ -11,7 +11,7 @@ use time::Duration;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SignIn {
     /// It is this user.
-    Welcome(User),
+    Welcome(Box<User>),
     /// Name and password do not fit, or the user is disabled; it is not said which.
     Refused,
     /// Too many sign-ins have failed; the next may be tried after this time.
@@ -52,21 +52,7 @@ impl Store {
         let user = self.user(row.try_get("organisation_id")?, row.try_get("id")?).await?;
         self.note_use(user.client.id, self.now()).await?;
         tracing::info!(event = "signed_in", user = %user.client.id, %from, "a user has signed in");
-        Ok(SignIn::Welcome(user))
-    }
-
-    /// True when this is the password of the user; for a change, which asks for it again.
-    ///
-    /// # Errors
-    /// When the database fails.
-    pub async fn is_password_of(&self, user: &User, password: &Password) -> Result<bool, StorageError> {
-        let digest: Option<String> = query("SELECT password_hash FROM users WHERE id = $1")
-            .bind(user.client.id)
-            .fetch_optional_value(self.reader())
-            .await?
-            .flatten();
-        let typed = password.clone();
-        self.slowly(move || typed.matches(digest.as_deref())).await
+        Ok(SignIn::Welcome(Box::new(user)))
     }
 
     /// The user who is signed in to the pages with this token, also one who has to change the password first; none for the session of
