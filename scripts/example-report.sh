@@ -57,6 +57,7 @@ post() {
 
 patient=$(post /v1/patients '{"pseudonym": "example", "birth_year": 1947, "sex": "female", "height_m": 1.64,
     "uses_walking_aid": false}' | member id)
+post "/v1/patients/$patient/consents" '{"scope": "assessment", "text_version": "example"}' >"$work/answer"
 post "/v1/patients/$patient/questionnaires" '{"falls_12_months": 1, "medicines": 5, "takes_psychotropic": false,
     "lives_in_community": true, "worries_about_falling": true, "feels_unsteady": true}' >"$work/answer"
 post "/v1/patients/$patient/training-plans" '{"sessions_per_week": 3, "exercises": [{"protocol": "back_knee",

@@ -70,6 +70,7 @@ curl --silent --fail "$address/openapi.json" | member paths '/v1/sessions/{id}/r
     application/json example | python3 -c 'import ast, json, sys
 print(json.dumps(ast.literal_eval(sys.stdin.read())))' >"$work/recording.json"
 PATIENT_ID=$(post /v1/patients '{"pseudonym": "schemathesis"}' | member id)
+post "/v1/patients/$PATIENT_ID/consents" '{"scope": "assessment", "text_version": "1"}' >"$work/consent"
 SESSION_ID=$(post /v1/sessions "{\"patient_id\": \"$PATIENT_ID\"}" | member id)
 post "/v1/sessions/$SESSION_ID/recordings" "@$work/recording.json" >"$work/uploaded"
 RECORDING_ID=$(member recording id <"$work/uploaded")

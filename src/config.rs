@@ -49,6 +49,14 @@ pub struct Config {
     pub requests_per_minute: u32,
     /// Requests without a valid key that one address may send in a minute, and at once; 0 for no limit.
     pub anonymous_requests_per_minute: u32,
+    /// False only on a test stand without people: uploads and jobs then need no consent of the patient.
+    pub require_consent: bool,
+    /// Days after which the bytes of a recording that was assessed are removed, from its upload on; 0 keeps them.
+    pub retain_recordings_days: u32,
+    /// Days without a session after which a patient is erased; 0 keeps patients.
+    pub retain_patients_days: u32,
+    /// Days after which entries of the audit log are removed; 0 keeps them.
+    pub retain_audit_days: u32,
     /// Tokens of an identity provider.
     pub oidc: OidcConfig,
 }
@@ -153,6 +161,10 @@ impl Default for Config {
             requests_per_minute: 1200,
             anonymous_requests_per_minute: 120,
             oidc: OidcConfig::default(),
+            require_consent: true,
+            retain_recordings_days: 0,
+            retain_patients_days: 0,
+            retain_audit_days: 0,
         }
     }
 }

@@ -27,6 +27,11 @@ def record(path):
     write_recording.main(path)
 
 
+def ask_for_consent():
+    """What the patient has agreed to; put your text and your signature pad here. Without it the service takes no recording."""
+    return {"scope": "assessment", "text_version": "example 1"}
+
+
 def upload(client, session_id, path, attempts=3):
     """Uploads a recording; checked on arrival, and after a broken connection sent again under the same key."""
     with open(path, "rb") as file:
@@ -70,6 +75,8 @@ def main(address, key):
     patient = client.create_patient(
         body={"pseudonym": f"home-{time.time_ns()}", "birth_year": 1950, "uses_walking_aid": False, "height_m": 1.75}
     )
+    consent = ask_for_consent()
+    client.record_consent(id=patient["id"], body=consent)
     session = client.create_session(body={"patient_id": patient["id"], "protocol": "squat"})
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "squats.mcap")

@@ -3,6 +3,7 @@
 
     client = Client("http://127.0.0.1:8080", key)
     patient = client.create_patient(body={"pseudonym": "P-023"})
+    client.record_consent(id=patient["id"], body={"scope": "assessment", "text_version": "2026-1"})
     client.read_report(id=patient["id"])
 
 Parameters of path, query and header are given by their names (`-` as `_`). Needs nothing but Python.

@@ -59,8 +59,9 @@ class Service:
         return content
 
     def new_session(self, pseudonym):
-        """A new patient and a session of theirs; both ids."""
+        """A new patient who consents, and a session of theirs; both ids."""
         patient = self.post("/v1/patients", {"pseudonym": pseudonym})["id"]
+        self.post(f"/v1/patients/{patient}/consents", {"scope": "assessment", "text_version": "load"})
         return patient, self.post("/v1/sessions", {"patient_id": patient})["id"]
 
     def finished(self, job_id, timeout_s=600, pause_s=0.005):

@@ -6,6 +6,7 @@
 //! Besides a key, a reading request may bring the cookie of somebody who is signed in to the pages: their script reads the same
 //! addresses. A cookie never authorises a request that changes something, so that no other site can make a browser do so.
 
+use super::auditing::recognise;
 use super::error::ApiError;
 use super::oidc::Oidc;
 use super::state::AppState;
@@ -41,7 +42,10 @@ impl FromRequestParts<AppState> for Caller {
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
         match identify(parts, state).await {
-            Ok(caller) => state.rates.count_client(caller.client.id).map(|()| caller),
+            Ok(caller) => {
+                recognise(&parts.extensions, &caller.client);
+                state.rates.count_client(caller.client.id).map(|()| caller)
+            }
             Err(refusal @ (ApiError::Unauthenticated(_) | ApiError::KeyExpired)) => {
                 // What brings nothing has been counted on its way here.
                 if [header::AUTHORIZATION, header::COOKIE].iter().any(|name| parts.headers.contains_key(name)) {

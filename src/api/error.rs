@@ -5,7 +5,7 @@
 
 use crate::queue::Crowded;
 use crate::recording::DecodeError;
-use crate::storage::StorageError;
+use crate::storage::{ConsentState, StorageError};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
@@ -73,6 +73,10 @@ pub enum ApiError {
     TooManyRequests(u64, &'static str),
     /// A good key whose role does not reach this far.
     Forbidden(&'static str),
+    /// The patient's consent is missing, or over.
+    NoConsent(ConsentState),
+    /// The bytes of the recording were removed by a rule of retention.
+    ContentRemoved,
     /// Nothing here that the caller may see; the text names the kind of thing.
     NotFound(&'static str),
     /// The state of the thing does not allow this.
@@ -143,6 +147,12 @@ impl ApiError {
             Self::Forbidden(needed) => {
                 let detail = format!("This request needs a key with the role {needed}. Ask an administrator for one.");
                 Problem::new(S::FORBIDDEN, "forbidden", detail)
+            }
+            Self::NoConsent(state) => Problem::new(S::FORBIDDEN, "consent_required", no_consent(*state)),
+            Self::ContentRemoved => {
+                let detail =
+                    "The bytes of this recording were removed by a rule of retention; what was found in them stays.";
+                Problem::new(S::GONE, "content_removed", detail)
             }
             Self::NotFound(kind) => {
                 let detail = format!("There is no {kind} with this id that your key may see. Check the id.");
@@ -215,6 +225,7 @@ impl From<StorageError> for ApiError {
         match error {
             StorageError::NotFound { what } => Self::NotFound(what),
             StorageError::Conflict { code, sentence } => Self::Conflict(code, sentence),
+            StorageError::NoConsent(state) => Self::NoConsent(state),
             full if full.is_out_of_space() => {
                 tracing::error!(error = format!("{full:#}"), "the disk is full");
                 Self::OutOfSpace
@@ -222,6 +233,19 @@ impl From<StorageError> for ApiError {
             other => Self::internal(other),
         }
     }
+}
+
+/// Why the patient's consent does not do, and what does.
+fn no_consent(state: ConsentState) -> String {
+    let why = match state {
+        ConsentState::Withdrawn => "The patient has withdrawn the consent to assessment",
+        ConsentState::Expired => "The patient's consent to assessment has come to its end",
+        ConsentState::Missing | ConsentState::Valid => "No valid consent of the patient to assessment is recorded",
+    };
+    format!(
+        "{why}: nothing was stored and nothing is computed. When the patient agrees, a clinician records it with \
+         POST /v1/patients/{{id}}/consents; then send the request again."
+    )
 }
 
 /// One sentence that names every defect.
@@ -303,6 +327,7 @@ fn title(status: StatusCode, code: &str) -> &'static str {
         "unknown_address" => "Unknown address",
         "not_found" => "Not found",
         "out_of_space" => "No room left",
+        "consent_required" => "The patient's consent is needed",
         _ if status == StatusCode::UNPROCESSABLE_ENTITY => "The recording was refused",
         _ => status.canonical_reason().unwrap_or("Refused"),
     }

@@ -1,7 +1,7 @@
 //! Read-only FHIR R4: measures, findings and reports as resources, by id and by search.
 
 use super::assessments::AssessmentPath;
-use super::auth::Clinician;
+use super::auth::{Caller, Clinician};
 use super::error::ApiError;
 use super::page::id_from_cursor;
 use super::patients::PatientPath;
@@ -13,7 +13,7 @@ use crate::report::fhir::observation::observation;
 use crate::report::fhir::risk_assessment::{risk_assessment, risk_assessment_id};
 use crate::report::fhir::{self, Found, SeriesOrigin, diagnostic_report::diagnostic_report, series_bundle};
 use crate::report::{MeasureSource, PatientReport};
-use crate::storage::{AssessmentId, MeasureFilter, MeasureId, PageRequest, Parts, PatientId, SeriesQuery};
+use crate::storage::{AssessmentId, MeasureFilter, MeasureId, PageRequest, Parts, PatientId, SeriesQuery, Store};
 use axum::extract::State;
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
@@ -102,8 +102,13 @@ async fn read_fhir_bundle(
     ApiQuery(query): ApiQuery<ReportQuery>,
 ) -> Result<Response, ApiError> {
     let report = report_of(&state.store, &caller, path.id, query.as_of).await?;
-    let origins = state.store.origins_of_assessments(&caller.access, &assessments_of(&report)).await?;
-    Ok(answer(&fhir::report_bundle(&report, &origins, BASE)))
+    Ok(answer(&bundle_of(&state.store, &caller, &report).await?))
+}
+
+/// A report as a FHIR bundle.
+pub(super) async fn bundle_of(store: &Store, caller: &Caller, report: &PatientReport) -> Result<Value, ApiError> {
+    let origins = store.origins_of_assessments(&caller.access, &assessments_of(report)).await?;
+    Ok(fhir::report_bundle(report, &origins, BASE))
 }
 
 /// Read the series of an assessment as a FHIR bundle

@@ -5,10 +5,14 @@
 //! document come from the same lines, so they cannot disagree.
 
 pub mod assessments;
+pub mod audit;
+pub mod auditing;
 pub mod auth;
 pub mod clients;
+pub mod consents;
 mod docs;
 pub mod entries;
+pub mod erasures;
 pub mod error;
 pub mod etag;
 pub mod exports;
@@ -21,6 +25,7 @@ pub mod observe;
 pub mod oidc;
 mod openapi;
 pub mod page;
+pub mod patient_export;
 pub mod patients;
 pub mod peer;
 pub mod protocols;
@@ -70,6 +75,7 @@ pub fn router_with(others: Router<AppState>, state: AppState) -> Router {
     let compressible = SizeAbove::new(COMPRESS_ABOVE)
         .and(NotForContentType::SSE)
         .and(NotForContentType::const_new("application/octet-stream"))
+        .and(NotForContentType::const_new("application/zip"))
         .and(NotForContentType::const_new("application/vnd.surefoot.mcap"));
     routes
         .merge(docs::router(&openapi::complete(&document)))
@@ -77,6 +83,7 @@ pub fn router_with(others: Router<AppState>, state: AppState) -> Router {
         .fallback(|| async { StatusCode::NOT_FOUND })
         .layer(middleware::from_fn_with_state(state.clone(), rates::count_strangers))
         .layer(CatchPanicLayer::custom(observe::problem_of_panic))
+        .layer(middleware::from_fn_with_state(state.clone(), auditing::audit))
         .layer(middleware::from_fn(observe::observe))
         .layer(option_layer(state.config.behind_tls.then(only_by_tls)))
         .layer(CompressionLayer::new().compress_when(compressible))
@@ -101,6 +108,7 @@ fn documented_routes() -> OpenApiRouter<AppState> {
     let timeout = TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, ORDINARY_TIMEOUT);
     let ordinary = OpenApiRouter::new()
         .merge(patients::router())
+        .merge(consents::router())
         .merge(sessions::router())
         .merge(recordings::router())
         .merge(jobs::router())
@@ -115,12 +123,15 @@ fn documented_routes() -> OpenApiRouter<AppState> {
         .merge(clients::router())
         .merge(users::router())
         .merge(shares::router())
+        .merge(audit::router())
         .merge(health::router())
         .merge(metrics::router())
         .layer(timeout);
     OpenApiRouter::with_openapi(openapi::base())
         .merge(ordinary)
         .merge(upload::router())
+        .merge(erasures::router())
+        .merge(patient_export::router())
         .merge(recordings::content_router())
         .merge(jobs::events_router())
 }

@@ -31,10 +31,15 @@ const DOCS_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'",
 );
 
+/// Name of one request, for handlers and layers inside.
+#[derive(Debug, Clone)]
+pub struct RequestId(pub String);
+
 /// Middleware around every route.
-pub async fn observe(request: Request, next: Next) -> Response {
+pub async fn observe(mut request: Request, next: Next) -> Response {
     let started = Instant::now();
     let id = request_id(request.headers());
+    request.extensions_mut().insert(RequestId(id.clone()));
     let method = request.method().clone();
     let in_docs = request.uri().path().starts_with("/docs");
     let matched = request.extensions().get::<MatchedPath>().cloned();

@@ -10,7 +10,8 @@ const DESCRIPTION: &str = "\
 Recordings of human movement go in, joint angles with their credible intervals come out: from a camera's skeleton, and \
 from inertial units on the body together with it, which also give places of joints.
 
-The way of one recording: make a patient known (`POST /v1/patients`), begin a session (`POST /v1/sessions`), upload \
+The way of one recording: make a patient known (`POST /v1/patients`), record the patient's consent (`POST \
+/v1/patients/{id}/consents`), begin a session (`POST /v1/sessions`), upload \
 (`POST /v1/sessions/{id}/recordings`), follow the job that the answer names (`GET /v1/jobs/{id}`, or its events), read \
 the assessment that the finished job names.
 
@@ -46,6 +47,7 @@ person, and the paths of the fields concerned.
     components(schemas(Problem, FieldError)),
     tags(
         (name = "patients", description = "Pseudonymous patients"),
+        (name = "consents", description = "What a patient has agreed to"),
         (name = "sessions", description = "One sitting of a patient"),
         (name = "recordings", description = "Uploads and their bytes"),
         (name = "jobs", description = "The work on a recording"),
@@ -58,6 +60,7 @@ person, and the paths of the fields concerned.
         (name = "clients", description = "Holders of keys"),
         (name = "shares", description = "Patients that another organisation may read"),
         (name = "users", description = "People who sign in"),
+        (name = "audit", description = "Who did or read what"),
         (name = "health", description = "For the operator"),
     )
 )]
@@ -218,7 +221,9 @@ fn name_contents(document: &mut Value) {
         for contents in messages.into_iter().filter_map(|message| message.get_mut("content")?.as_object_mut()) {
             for (kind, content) in contents {
                 match kind.as_str() {
-                    "application/mcap" | "application/octet-stream" => content["schema"] = bytes.clone(),
+                    "application/mcap" | "application/octet-stream" | "application/zip" => {
+                        content["schema"] = bytes.clone()
+                    }
                     "text/event-stream" => content["schema"] = event.clone(),
                     _ => {}
                 }
@@ -229,7 +234,7 @@ fn name_contents(document: &mut Value) {
 
 /// Where the ids of an answer lead: (operation, status, place of the id in the body, operations that take it as `id`).
 const LINKS: [(&str, &str, &str, &[&str]); 12] = [
-    ("create_patient", "201", "/id", &["read_patient", "update_patient"]),
+    ("create_patient", "201", "/id", &["read_patient", "update_patient", "record_consent"]),
     ("create_session", "201", "/id", &["read_session", "list_recordings", "upload_recording"]),
     ("create_client", "201", "/client/id", &["revoke_client", "rotate_client"]),
     ("create_share", "201", "/id", &["revoke_share"]),

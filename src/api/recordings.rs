@@ -65,13 +65,25 @@ pub struct RecordingResponse {
     /// When it was stored.
     #[serde(with = "time::serde::rfc3339")]
     pub created_at: OffsetDateTime,
+    /// Since when its bytes are gone, by a rule of retention; null while they are there. What was found in them stays.
+    #[serde(with = "time::serde::rfc3339::option")]
+    pub content_removed_at: Option<OffsetDateTime>,
 }
 
 impl From<StoredRecording> for RecordingResponse {
     fn from(stored: StoredRecording) -> Self {
-        let StoredRecording { id, session_id, patient_id, created_by, blob, inspection, created_at } = stored;
+        let StoredRecording {
+            id,
+            session_id,
+            patient_id,
+            created_by,
+            blob,
+            inspection,
+            created_at,
+            content_removed_at,
+        } = stored;
         let (size_bytes, sha256) = (blob.size_bytes, blob.sha256);
-        Self { id, session_id, patient_id, created_by, size_bytes, sha256, inspection, created_at }
+        Self { id, session_id, patient_id, created_by, size_bytes, sha256, inspection, created_at, content_removed_at }
     }
 }
 
@@ -200,6 +212,8 @@ async fn read_recording(
     params(RecordingPath),
     responses((status = 200, description = "The bytes", content(
                 (Vec<u8> = "application/mcap"), (Object = "application/json"))),
+              (status = 410, description = "The bytes were removed by a rule of retention (`content_removed`)",
+               body = super::error::Problem, content_type = "application/problem+json"),
               (status = 304, description = "Not changed since the ETag in If-None-Match")))]
 async fn read_recording_content(
     State(state): State<AppState>,
@@ -208,6 +222,9 @@ async fn read_recording_content(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let recording = state.store.recording(&caller.access, path.id).await?;
+    if recording.content_removed_at.is_some() {
+        return Err(ApiError::ContentRemoved);
+    }
     let tag = ETag::of(&[recording.blob.sha256.as_bytes()]);
     if tag.is_known(&headers) {
         return Ok(tag.not_modified());
@@ -222,7 +239,7 @@ async fn read_recording_content(
 }
 
 /// Reads on a blocking thread, one chunk at a time: memory does not grow with the recording.
-async fn next_chunk(mut reader: BlobReader) -> std::io::Result<Option<(Bytes, BlobReader)>> {
+pub(super) async fn next_chunk(mut reader: BlobReader) -> std::io::Result<Option<(Bytes, BlobReader)>> {
     let reading = tokio::task::spawn_blocking(move || {
         let mut chunk = Vec::with_capacity(DOWNLOAD_CHUNK);
         reader.by_ref().take(DOWNLOAD_CHUNK as u64).read_to_end(&mut chunk)?;
@@ -257,7 +274,11 @@ fn validate_fusion(
 #[utoipa::path(post, path = "/v1/recordings/{id}/jobs", tag = "recordings", operation_id = "create_job",
     security(("api_key" = ["device"])),
     params(RecordingPath), request_body = Settings,
-    responses((status = 202, description = "Queued; Location says where the job lives", body = JobResponse)))]
+    responses((status = 202, description = "Queued; Location says where the job lives", body = JobResponse),
+              (status = 403, description = "The patient has not consented to assessment (`consent_required`), or the role of \
+                the key does not reach this far", body = super::error::Problem, content_type = "application/problem+json"),
+              (status = 409, description = "The bytes were removed by a rule of retention (`content_removed`)",
+               body = super::error::Problem, content_type = "application/problem+json")))]
 async fn create_job(
     State(state): State<AppState>,
     caller: Caller,

@@ -8,6 +8,7 @@ use crate::config::Config;
 use crate::queue::Queue;
 use crate::recording::decode::Limits;
 use crate::storage::Store;
+use crate::storage::audit::AuditTrail;
 use metrics_exporter_prometheus::{BuildError, PrometheusHandle};
 use std::sync::Arc;
 use tokio::sync::Semaphore;
@@ -35,6 +36,8 @@ pub struct AppState {
     pub store: Store,
     /// Jobs.
     pub queue: Queue,
+    /// The way into the audit log.
+    pub audit: AuditTrail,
     /// What the operator set.
     pub config: Arc<Config>,
     /// How much of a recording is accepted.
@@ -54,7 +57,7 @@ pub struct AppState {
 }
 
 impl AppState {
-    /// The state of one service.
+    /// The state of one service. Inside a runtime: the audit log is written by a task.
     ///
     /// # Errors
     /// When the process has another metrics recorder already, or the identity provider's settings do not fit.
@@ -62,6 +65,7 @@ impl AppState {
         Ok(Self {
             oidc: Oidc::of(&config.oidc)?.map(Arc::new),
             store: queue.store().clone(),
+            audit: AuditTrail::start(queue.store().clone()),
             queue,
             rates: Rates::new(&config),
             config: Arc::new(config),

@@ -153,6 +153,15 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Recordings that a training reads, the first static one among them; none for the work on one recording.
+    pub fn training_recordings(&self) -> impl Iterator<Item = Uuid> {
+        let (still, movement) = match self {
+            Settings::NoiseModel(settings) => (&settings.static_recordings[..], &settings.movement_recordings[..]),
+            Settings::JointAngles(_) | Settings::SkeletonFusion(_) | Settings::LegPose(_) => (&[][..], &[][..]),
+        };
+        still.iter().chain(movement).copied()
+    }
+
     /// What suits a recording that nobody said anything about: fusion where inertial units are worn on bones of the model,
     /// joint angles otherwise.
     pub fn suited_to(units: impl IntoIterator<Item = Segment>) -> Self {

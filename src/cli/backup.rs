@@ -1,13 +1,14 @@
 //! `surefoot backup`, `restore` and `doctor`: the data directory copied, brought back, examined.
 
 use super::serve;
+use crate::config::Config;
 use crate::storage::{self, Store};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
 
 /// Which data directory is meant.
 #[derive(Debug, Clone, clap::Args)]
-struct Whose {
+pub(super) struct Whose {
     /// Data directory; default: as `surefoot serve` would choose
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
@@ -17,15 +18,20 @@ struct Whose {
 }
 
 impl Whose {
-    fn data_dir(&self) -> anyhow::Result<PathBuf> {
+    pub(super) fn data_dir(&self) -> anyhow::Result<PathBuf> {
         match &self.data_dir {
             Some(folder) => Ok(folder.clone()),
-            None => Ok(serve::load_config(self.config.as_deref())?.data_dir),
+            None => Ok(self.configuration()?.data_dir),
         }
     }
 
+    /// What `surefoot serve` would go by.
+    pub(super) fn configuration(&self) -> anyhow::Result<Config> {
+        serve::load_config(self.config.as_deref())
+    }
+
     /// The store of a directory that is one already: a look must not make one.
-    async fn store(&self) -> anyhow::Result<Store> {
+    pub(super) async fn store(&self) -> anyhow::Result<Store> {
         let folder = self.data_dir()?;
         if !folder.is_dir() {
             bail!("there is no data directory {}; name it with --data-dir", folder.display());
@@ -49,14 +55,31 @@ pub struct BackupArgs {
 
 /// Make a data directory from a backup
 ///
-/// Checks every digest on the way. The service must not run on that directory meanwhile.
+/// Checks every digest on the way. The service must not run on that directory meanwhile. Patients who were erased after the
+/// backup was made are in it; the list of erasures says who they are, and they are erased again.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = "Example:\n  surefoot restore /backups/2026-11-27 --data-dir /var/lib/surefoot-restored")]
+#[command(
+    after_help = "Example:\n  surefoot restore /backups/2026-11-27 --data-dir /var/lib/surefoot-restored \\\n      --erasures /var/lib/surefoot/erasures.jsonl"
+)]
 pub struct RestoreArgs {
     /// Folder that `surefoot backup` wrote
     backup: PathBuf,
     #[command(flatten)]
     whose: Whose,
+    #[command(flatten)]
+    erased: Erased,
+}
+
+/// What becomes of patients who were erased after the backup was made.
+#[derive(Debug, Clone, clap::Args)]
+#[group(required = true, multiple = false)]
+struct Erased {
+    /// List of erasures of the data directory that was in use (`erasures.jsonl` in it): whoever is on it is erased again
+    #[arg(long, value_name = "FILE")]
+    erasures: Option<PathBuf>,
+    /// Restore without a list: nobody was erased since, or there is no list any more
+    #[arg(long)]
+    without_erasures: bool,
 }
 
 /// Look for damage in the data directory
@@ -93,6 +116,11 @@ pub async fn back_up(args: &BackupArgs) -> anyhow::Result<()> {
 /// When the folder is no backup or is damaged, or the data directory is not empty.
 pub async fn restore(args: &RestoreArgs) -> anyhow::Result<()> {
     let data_dir = args.whose.data_dir()?;
+    if let Some(list) = &args.erased.erasures
+        && !list.is_file()
+    {
+        bail!("there is no list of erasures {}", list.display());
+    }
     let manifest = storage::restore(&args.backup, &data_dir).await?;
     println!(
         "{}: {} recordings and the database of {}, made by version {}",
@@ -101,6 +129,20 @@ pub async fn restore(args: &RestoreArgs) -> anyhow::Result<()> {
         manifest.created_at,
         manifest.software_version
     );
+    let store = Store::open(&data_dir).await?;
+    store.rebuild_erasure_list().await?;
+    let erased = match &args.erased.erasures {
+        Some(list) => Some(store.erase_listed(list).await),
+        None => None,
+    };
+    store.close().await;
+    match erased {
+        Some(erased) => {
+            let unsafe_to_use = "patients who were erased since the backup are in it: do not use this data directory";
+            println!("{} patients who were erased since then were erased again", erased.context(unsafe_to_use)?);
+        }
+        None => println!("patients who were erased since then are in it again"),
+    }
     Ok(())
 }
 

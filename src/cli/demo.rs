@@ -123,6 +123,8 @@ async fn journey(args: &Args, running: &Running, key: &str) -> anyhow::Result<Ve
     let client = Client::new(running.addr, key)?;
     let pseudonym = format!("demo-{}", uuid::Uuid::now_v7().simple());
     let patient = client.post("/v1/patients", &json!({"pseudonym": pseudonym, "height_m": 1.7})).await?;
+    let consent = json!({"scope": "assessment", "text_version": "demo"});
+    client.post(&format!("/v1/patients/{}/consents", text(&patient, "id")?), &consent).await?;
     let session = json!({"patient_id": patient["id"], "protocol": args.exercise.name()});
     let session = client.post("/v1/sessions", &session).await?;
     let accepted = client.upload(&format!("/v1/sessions/{}/recordings", text(&session, "id")?), bytes).await?;

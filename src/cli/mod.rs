@@ -2,9 +2,11 @@
 
 pub mod assess;
 mod assess_legs;
+pub mod audit;
 pub mod backup;
 pub mod demo;
 pub mod evaluate;
+mod housekeeping;
 pub mod import;
 pub mod import_depth;
 pub mod key;
@@ -12,6 +14,8 @@ mod method;
 mod noise_model;
 pub mod openapi;
 mod overlay;
+pub mod patient;
+pub mod retention;
 pub mod serve;
 pub mod simulate;
 pub mod simulate_walker;
@@ -44,6 +48,9 @@ enum Command {
     Train(train::Args),
     Key(key::Args),
     User(user::Args),
+    Patient(patient::Args),
+    Retention(retention::Args),
+    Audit(audit::Args),
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
     Doctor(backup::DoctorArgs),
@@ -93,6 +100,9 @@ pub fn run() -> anyhow::Result<()> {
         Command::Train(args) => train::run(&args),
         Command::Key(args) => runtime.block_on(key::run(&args)),
         Command::User(args) => runtime.block_on(user::run(&args)),
+        Command::Patient(args) => runtime.block_on(patient::run(&args)),
+        Command::Retention(args) => runtime.block_on(retention::run(&args)),
+        Command::Audit(args) => runtime.block_on(audit::run(&args)),
         Command::Backup(args) => runtime.block_on(backup::back_up(&args)),
         Command::Restore(args) => runtime.block_on(backup::restore(&args)),
         Command::Doctor(args) => runtime.block_on(backup::examine(&args)),

@@ -1,10 +1,13 @@
 //! `surefoot serve`: the service on one machine.
 
+use super::housekeeping;
 use crate::api::AppState;
 use crate::config::Config;
 use crate::pages;
 use crate::queue::{Messenger, Queue, QueueSettings};
 use crate::recording::decode::Limits;
+use crate::storage::audit::AuditTrail;
+use crate::storage::retention::RetentionRules;
 use crate::storage::{Places, Store, SystemClock};
 use crate::worker;
 use anyhow::Context;
@@ -125,6 +128,7 @@ pub struct Running {
     /// The first admin key, when this start made one. It cannot be shown again.
     pub admin_key: Option<String>,
     store: Store,
+    audit: AuditTrail,
     stop: CancellationToken,
     server: JoinHandle<std::io::Result<()>>,
     workers: JoinSet<()>,
@@ -151,6 +155,9 @@ impl Running {
             tracing::warn!("some jobs did not stop in time; their lease expires and they run again");
             self.workers.abort_all();
         }
+        if !self.audit.flush().await {
+            tracing::error!("the last entries of the audit log could not be written");
+        }
         self.store.close().await;
         served
     }
@@ -161,6 +168,12 @@ impl Running {
 /// # Errors
 /// When the data directory cannot be used or the address is taken.
 pub async fn start(config: Config) -> anyhow::Result<Running> {
+    if !config.require_consent {
+        tracing::warn!(
+            "REQUIRE_CONSENT IS OFF: recordings are stored and assessed without any patient's consent. This is for a test stand \
+             without people; with people, remove `require_consent = false`"
+        );
+    }
     let store = open_store(&config).await?;
     let admin_key = store.ensure_first_admin().await?.map(|key| key.reveal().to_owned());
     let stop = CancellationToken::new();
@@ -170,7 +183,9 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
     let addr = listener.local_addr()?;
     let limits = recording_limits(&config);
     let (n_workers, has_canary) = (config.workers, config.canary);
+    let rules = RetentionRules::from(&config);
     let state = AppState { shutdown: stop.clone(), ..AppState::new(queue.clone(), config, limits.clone())? };
+    let audit = state.audit.clone();
 
     let mut workers = worker::spawn(&queue, n_workers, &limits, has_canary, &stop);
     let (metrics, rates) = (state.metrics.clone(), state.rates.clone());
@@ -182,10 +197,11 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
             rates.tidy();
         }
     });
+    workers.spawn(housekeeping::run(state.store.clone(), rules, stop.clone()));
     let router = pages::router(state).into_make_service_with_connect_info::<SocketAddr>();
     let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let server = tokio::spawn(serving.into_future());
-    Ok(Running { addr, admin_key, store, stop, server, workers })
+    Ok(Running { addr, admin_key, store, audit, stop, server, workers })
 }
 
 /// Opens the store that the configuration names.

@@ -2,6 +2,7 @@
 
 use super::error::PageError;
 use crate::api::AppState;
+use crate::api::auditing::recognise;
 use crate::api::auth::{Caller, PAGE_COOKIE, caller_of_page};
 use crate::api::peer::peer_address;
 use crate::config::Config;
@@ -30,6 +31,7 @@ impl FromRequestParts<AppState> for Visitor {
         let caller = caller_of_page(&parts.headers, state).await?;
         match caller {
             Some(caller) if is_of_pages(caller.client.role) => {
+                recognise(&parts.extensions, &caller.client);
                 state.rates.count_client(caller.client.id)?;
                 Ok(Self(caller))
             }

@@ -5,11 +5,13 @@ use super::error::PageError;
 use super::frame::{Frame, page};
 use super::password;
 use crate::api::AppState;
+use crate::api::auditing::Recognised;
 use crate::api::auth::page_token;
 use crate::api::observe::ForPerson;
 use crate::storage::sign_in_failures::{Concerned, MaySignIn};
-use crate::storage::{ApiKey, ClientId, KeyHolder, Password, SignIn};
+use crate::storage::{ApiKey, Client, ClientId, KeyHolder, Password, SignIn};
 use askama::Template;
+use axum::Extension;
 use axum::extract::{Form, Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Redirect, Response};
@@ -80,6 +82,7 @@ pub(super) async fn show(
 pub(super) async fn sign_in(
     State(state): State<AppState>,
     Peer(from): Peer,
+    Extension(recognised): Extension<Recognised>,
     headers: HeaderMap,
     Form(sent): Form<SignInForm>,
 ) -> Result<Response, PageError> {
@@ -93,8 +96,12 @@ pub(super) async fn sign_in(
     let (client, next) = match known {
         Ok((client, true)) => (client, password::ADDRESS),
         Ok((client, false)) => (client, next),
-        Err(Refusal::For(status, why)) => return form(next, Some(why), status),
+        Err(Refusal::For(status, why)) => {
+            recognised.set_nobody();
+            return form(next, Some(why), status);
+        }
         Err(Refusal::Wait(wait)) => {
+            recognised.set_nobody();
             let mut response = form(next, Some(TOO_MANY), StatusCode::TOO_MANY_REQUESTS)?;
             response.headers_mut().insert(header::RETRY_AFTER, (wait.whole_seconds() + 1).into());
             return Ok(response);
@@ -104,7 +111,8 @@ pub(super) async fn sign_in(
     if let Some(old) = page_token(&headers) {
         state.store.end_page_session(&old).await?;
     }
-    begin_session(&state, client, &headers, next).await
+    recognised.set_client(&client);
+    begin_session(&state, client.id, &headers, next).await
 }
 
 /// A new session, and the way on.
@@ -125,14 +133,14 @@ async fn with_password(
     state: &AppState,
     sent: &SignInForm,
     from: IpAddr,
-) -> Result<Result<(ClientId, bool), Refusal>, PageError> {
+) -> Result<Result<(Client, bool), Refusal>, PageError> {
     const WRONG: &str = "Name and password do not fit, or the account is disabled. After a few failures there is a wait. \
                          An administrator can give you a new password.";
     const LOCKED: &str =
         "Too many sign-ins with this name have failed in a row. An administrator has to give you a new password.";
     let typed = Password::from_text(&sent.password);
     Ok(match state.store.sign_in(&sent.name, &typed, from).await? {
-        SignIn::Welcome(user) => Ok((user.client.id, user.must_change_password)),
+        SignIn::Welcome(user) => Ok((user.client, user.must_change_password)),
         SignIn::Refused => Err(Refusal::For(StatusCode::UNAUTHORIZED, WRONG)),
         SignIn::Wait(wait) => Err(Refusal::Wait(wait)),
         SignIn::Locked => Err(Refusal::For(StatusCode::FORBIDDEN, LOCKED)),
@@ -140,7 +148,7 @@ async fn with_password(
 }
 
 /// The client of a key. Nobody guesses 256 random bits, so failures count against the address only.
-async fn with_key(state: &AppState, key: &str, from: IpAddr) -> Result<Result<(ClientId, bool), Refusal>, PageError> {
+async fn with_key(state: &AppState, key: &str, from: IpAddr) -> Result<Result<(Client, bool), Refusal>, PageError> {
     const UNKNOWN: &str =
         "This key is unknown or was revoked. Check that you copied all of it, or ask an administrator for a new one.";
     const EXPIRED: &str =
@@ -152,7 +160,7 @@ async fn with_key(state: &AppState, key: &str, from: IpAddr) -> Result<Result<(C
         return Ok(Err(Refusal::Wait(wait)));
     }
     let (status, why) = match state.store.holder_of_key(&ApiKey::from_text(key)).await? {
-        KeyHolder::Valid(client) if is_of_pages(client.role) => return Ok(Ok((client.id, false))),
+        KeyHolder::Valid(client) if is_of_pages(client.role) => return Ok(Ok((client, false))),
         KeyHolder::Valid(_) => (StatusCode::FORBIDDEN, DEVICE),
         KeyHolder::Expired => (StatusCode::UNAUTHORIZED, EXPIRED),
         KeyHolder::Unknown => (StatusCode::UNAUTHORIZED, UNKNOWN),
@@ -163,9 +171,16 @@ async fn with_key(state: &AppState, key: &str, from: IpAddr) -> Result<Result<(C
 }
 
 /// Signs out.
-pub(super) async fn sign_out(State(state): State<AppState>, headers: HeaderMap) -> Result<Response, PageError> {
+pub(super) async fn sign_out(
+    State(state): State<AppState>,
+    Extension(recognised): Extension<Recognised>,
+    headers: HeaderMap,
+) -> Result<Response, PageError> {
     check_form_is_own(&headers)?;
     if let Some(token) = page_token(&headers) {
+        if let Some(client) = state.store.client_of_page_session(&token).await? {
+            recognised.set_client(&client);
+        }
         state.store.end_page_session(&token).await?;
     }
     let mut response = Redirect::to("/app/sign-in").into_response();

@@ -26,7 +26,7 @@ impl Queue {
     /// Stores a recording and the job to assess it, both or neither, and wakes a worker.
     ///
     /// # Errors
-    /// `NotFound` (`session`) when the session is out of the caller's reach.
+    /// `NotFound` (`session`) when the session is out of the caller's reach; `NoConsent`.
     pub async fn submit(
         &self,
         access: &Access,
@@ -34,6 +34,7 @@ impl Queue {
         settings: &Settings,
     ) -> Result<(StoredRecording, Job), StorageError> {
         let mut transaction = self.store.begin().await?;
+        self.store.blobs().require(&new.blob).await?;
         let recording = recordings::insert(&mut transaction, access, new, self.store.now()).await?;
         let job = self.insert(&mut transaction, access, recording.id, settings).await?;
         transaction.commit().await?;
@@ -64,6 +65,7 @@ impl Queue {
             let same = kept.fingerprint == fingerprint;
             return Ok(if same { Submission::Replayed(kept.response) } else { Submission::KeyReused });
         }
+        self.store.blobs().require(&new.blob).await?;
         let recording = recordings::insert(&mut transaction, access, new, now).await?;
         let job = self.insert(&mut transaction, access, recording.id, settings).await?;
         let id = job.id;
@@ -102,6 +104,11 @@ impl Queue {
         recording: RecordingId,
         settings: &Settings,
     ) -> Result<Job, StorageError> {
+        self.check_consent(&mut *connection, recording, settings).await?;
+        recordings::require_content(&mut *connection, recording).await?;
+        for other in settings.training_recordings() {
+            recordings::require_content(&mut *connection, RecordingId(other)).await?;
+        }
         let now = ms_from_time(self.store.now());
         let id = JobId::new();
         let (base_ms, ms_per_megabyte) = expected_cost(settings);

@@ -18,6 +18,7 @@
 //! only save time; what they say is always in the table too.
 
 mod claiming;
+mod consent;
 mod enqueueing;
 mod finishing;
 mod job;
@@ -26,6 +27,7 @@ mod questions;
 mod turn;
 
 pub use claiming::Renewal;
+pub use consent::Withdrawal;
 pub use enqueueing::Submission;
 pub use finishing::{Failure, Finish, Trained};
 pub use job::{Job, JobError, JobFilter, JobState};
@@ -61,6 +63,8 @@ pub struct QueueSettings {
     pub most_waiting: u64,
     /// How many jobs of one organisation may wait.
     pub most_waiting_of_organisation: u64,
+    /// Whether a recording and a job need the patient's consent.
+    pub require_consent: bool,
 }
 
 impl Default for QueueSettings {
@@ -78,6 +82,7 @@ impl From<&Config> for QueueSettings {
             longest_pause: Duration::minutes(5),
             most_waiting: config.max_waiting_jobs,
             most_waiting_of_organisation: config.max_waiting_jobs_of_organisation,
+            require_consent: config.require_consent,
         }
     }
 }

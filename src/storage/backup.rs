@@ -179,7 +179,8 @@ pub async fn restore(backup: &Path, data_dir: &Path) -> Result<BackupManifest, S
 }
 
 /// Blobs that rows name.
-const BLOBS: &str = "SELECT DISTINCT blob_key, sha256, size_bytes FROM recordings ORDER BY blob_key";
+const BLOBS: &str = "SELECT DISTINCT blob_key, sha256, size_bytes FROM recordings
+                     WHERE content_removed_at IS NULL ORDER BY blob_key";
 
 async fn blobs_of(database: &Path) -> Result<Vec<BackupBlob>, StorageError> {
     let options = SqliteConnectOptions::new().filename(database).read_only(true);

@@ -1,5 +1,7 @@
 //! Why a question to the storage has no answer.
 
+use super::ConsentState;
+
 /// Failure of the storage, or an answer that the caller should pass on.
 #[derive(Debug, thiserror::Error)]
 pub enum StorageError {
@@ -17,6 +19,9 @@ pub enum StorageError {
         /// One sentence for a person.
         sentence: String,
     },
+    /// The patient's consent to it is missing, or over.
+    #[error("the patient has no valid consent: {0:?}")]
+    NoConsent(ConsentState),
     /// The database failed.
     #[error("the database failed: {0}")]
     Database(#[from] sqlx::Error),

@@ -64,6 +64,10 @@ ids! {
     ClientId;
     /// Identity of a pseudonymous patient.
     PatientId;
+    /// Identity of a consent of a patient.
+    ConsentId;
+    /// Identity of an erasure: the record that a patient was removed.
+    ErasureId;
     /// Identity of a session: one sitting of a patient.
     SessionId;
     /// Identity of a recording: one upload in a session.

@@ -14,18 +14,22 @@
 
 pub mod access;
 pub mod assessments;
+pub mod audit;
 pub mod backup;
 pub mod blobs;
 pub mod clients;
 pub mod clock;
+pub mod consents;
 pub(crate) mod database;
 pub mod entries;
+pub mod erasure;
 pub mod error;
 pub mod id;
 pub mod idempotency;
 pub mod joint_tracks;
 pub mod key_rotation;
 mod known_keys;
+mod maintenance;
 pub mod measures;
 pub mod noise_models;
 pub mod organisations;
@@ -35,11 +39,13 @@ pub mod patients;
 mod places;
 pub mod recent;
 pub mod recordings;
+pub mod retention;
 pub(crate) mod row;
 pub mod series;
 pub mod sessions;
 pub mod shares;
 pub mod sign_in_failures;
+pub mod uploads;
 pub mod users;
 
 pub use access::Access;
@@ -48,11 +54,13 @@ pub use backup::{Ailment, BackupManifest, restore};
 pub use blobs::{BlobReader, BlobStore, BlobWriter, SealedBlob, StoredBlob};
 pub use clients::{ApiKey, Client, KeyHolder, Role};
 pub use clock::{Clock, ManualClock, SystemClock};
+pub use consents::{Consent, ConsentScope, ConsentState, NewConsent};
 pub use entries::{Entry, Occasion};
+pub use erasure::{ErasedBlob, Erasure, ErasureReason};
 pub use error::StorageError;
 pub use id::{
-    AssessmentId, ClientId, JobId, MeasureId, MeasurementId, NoiseModelId, OrganisationId, PatientId, QuestionnaireId,
-    RecordingId, SessionId, ShareId, TrainingPlanId,
+    AssessmentId, ClientId, ConsentId, ErasureId, JobId, MeasureId, MeasurementId, NoiseModelId, OrganisationId,
+    PatientId, QuestionnaireId, RecordingId, SessionId, ShareId, TrainingPlanId,
 };
 pub use idempotency::StoredResponse;
 pub use key_rotation::Rotation;
@@ -67,11 +75,12 @@ pub use recordings::{NewRecording, RecordingFilter, StoredRecording};
 pub use series::{Parts, SeriesQuery, SeriesSlice};
 pub use sessions::{NewSession, Session, SessionFilter};
 pub use shares::Share;
+pub use uploads::{UploadUnderWay, Uploads};
 pub use users::{NewUser, Password, Provided, SignIn, User};
 
 use database::{Database, Transaction, query};
 use known_keys::KnownKeys;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use time::OffsetDateTime;
 use tokio::sync::Semaphore;
@@ -89,6 +98,9 @@ pub struct Store {
     clock: Arc<dyn Clock>,
     known_keys: KnownKeys,
     password_turns: Arc<Semaphore>,
+    uploads: Uploads,
+    audit_secret: audit::Secret,
+    erasure_list: PathBuf,
 }
 
 impl Store {
@@ -115,8 +127,19 @@ impl Store {
     pub async fn open_at(places: &Places, clock: Arc<dyn Clock>) -> Result<Self, StorageError> {
         let blobs = places.open_blobs().await?;
         let database = places.open_database().await?;
-        let password_turns = Arc::new(Semaphore::new(PASSWORDS_AT_ONCE));
-        Ok(Self { database, blobs, clock, known_keys: KnownKeys::default(), password_turns })
+        let mut transaction = database.begin().await?;
+        let audit_secret = audit::Secret::of_database(&mut transaction).await?;
+        transaction.commit().await?;
+        Ok(Self {
+            database,
+            blobs,
+            clock,
+            known_keys: KnownKeys::default(),
+            password_turns: Arc::new(Semaphore::new(PASSWORDS_AT_ONCE)),
+            uploads: Uploads::default(),
+            audit_secret,
+            erasure_list: places.data_dir.join(erasure::LIST_FILE),
+        })
     }
 
     /// The blobs.

@@ -3,7 +3,7 @@
 use super::access::shared_with;
 use super::clock::ms_from_time;
 use super::database::{Row, query};
-use super::{Access, Page, PageRequest, PatientId, StorageError, Store, row};
+use super::{Access, OrganisationId, Page, PageRequest, PatientId, StorageError, Store, row};
 use serde::{Deserialize, Serialize};
 use time::OffsetDateTime;
 use utoipa::ToSchema;
@@ -177,6 +177,15 @@ impl Store {
         .await?
         .ok_or(StorageError::not_found("patient"))?;
         patient_from_row(&row)
+    }
+
+    /// The organisation of a patient, for the operator at the machine.
+    ///
+    /// # Errors
+    /// `NotFound` when there is no such patient.
+    pub async fn organisation_of_patient(&self, id: PatientId) -> Result<OrganisationId, StorageError> {
+        let found = query("SELECT organisation_id FROM patients WHERE id = $1").bind(id);
+        found.fetch_optional_value(self.reader()).await?.ok_or(StorageError::not_found("patient"))
     }
 
     /// The patients of the organisation, newest first.

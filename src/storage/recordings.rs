@@ -37,6 +37,8 @@ pub struct StoredRecording {
     pub inspection: Inspection,
     /// When it was stored.
     pub created_at: OffsetDateTime,
+    /// Since when its bytes are gone, by a rule of retention; what was found in them stays.
+    pub content_removed_at: Option<OffsetDateTime>,
 }
 
 /// Which recordings are wanted; the default is all.
@@ -61,6 +63,7 @@ fn recording_from_row(row: &Row) -> Result<StoredRecording, StorageError> {
         },
         inspection: row::json(row, "inspection")?,
         created_at: row::time(row, "created_at")?,
+        content_removed_at: row::optional_time(row, "content_removed_at")?,
     })
 }
 
@@ -101,6 +104,23 @@ pub(crate) async fn insert(
     .fetch_one(connection)
     .await?;
     recording_from_row(&row)
+}
+
+/// Refuses work on a recording whose bytes are gone.
+pub(crate) async fn require_content(connection: &mut Transaction, id: RecordingId) -> Result<(), StorageError> {
+    let gone: Option<i64> = query("SELECT 1 FROM recordings WHERE id = $1 AND content_removed_at IS NOT NULL")
+        .bind(id)
+        .fetch_optional_value(connection)
+        .await?;
+    match gone {
+        None => Ok(()),
+        Some(_) => Err(StorageError::Conflict {
+            code: "content_removed",
+            sentence:
+                "the bytes of the recording were removed by a rule of retention, so it cannot be assessed any more"
+                    .into(),
+        }),
+    }
 }
 
 impl Store {

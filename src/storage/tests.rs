@@ -87,7 +87,7 @@ fn new_session(patient_id: PatientId) -> NewSession {
     NewSession { patient_id, started_at, protocol: Some("sit_front_knee".into()), notes: None, noise_model: None }
 }
 
-async fn new_recording(store: &Store, session_id: SessionId) -> NewRecording {
+pub(super) async fn new_recording(store: &Store, session_id: SessionId) -> NewRecording {
     let mut writer = store.blobs().writer().await.unwrap();
     writer.write("recording".into()).await.unwrap();
     let blob = writer.seal().await.unwrap().keep().await.unwrap();

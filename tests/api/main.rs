@@ -4,9 +4,12 @@
 #![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
 
 mod assessments;
+mod audit;
 mod authorisation;
 mod clients;
+mod consents;
 mod crowd;
+mod erasures;
 mod events;
 mod fall_risk;
 mod fusion;
@@ -16,6 +19,7 @@ mod leg_pose;
 mod noise_models;
 mod oidc;
 mod patient_calibration;
+mod patient_export;
 mod patients;
 mod performance;
 mod problems;

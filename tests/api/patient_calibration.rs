@@ -88,6 +88,7 @@ async fn the_calibration_of_another_patient_or_organisation_is_never_used() {
     let stranger = app.stranger().await;
     let made = app.post("/v1/patients").key(&stranger).json(&json!({"pseudonym": "P-1"})).send().await;
     let elsewhere = text(&made.expect(StatusCode::CREATED)["id"]).to_owned();
+    app.consent(&elsewhere, &stranger).await;
     assessed(&app, &stranger, &elsewhere, 2).await;
 
     let (recording, own) = assessed(&app, &app.admin, &patient, 3).await;

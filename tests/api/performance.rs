@@ -160,6 +160,7 @@ async fn a_walk_behind_a_walker_is_measured_by_its_footfalls_and_makes_its_perso
     let app = TestApp::new().await;
     let new = json!({"pseudonym": "P-9", "birth_year": 1948, "uses_walking_aid": false});
     let patient = text(&app.post("/v1/patients").json(&new).send().await.expect(StatusCode::CREATED)["id"]).to_owned();
+    app.consent(&patient, &app.admin).await;
     let session =
         app.post("/v1/sessions").json(&json!({"patient_id": patient})).send().await.expect(StatusCode::CREATED);
     let upload = app.post(&format!("/v1/sessions/{}/recordings", text(&session["id"])));

@@ -24,6 +24,8 @@ async fn an_upload_over_a_socket_is_worked_on_and_its_events_end() {
         async { request.send().await.unwrap().json::<Value>().await.unwrap() }
     };
     let patient = post("/v1/patients", json!({"pseudonym": "P-1"})).await;
+    let consent = json!({"scope": "assessment", "text_version": "test"});
+    post(&format!("/v1/patients/{}/consents", text(&patient["id"])), consent).await;
     let session = post("/v1/sessions", json!({"patient_id": patient["id"]})).await;
     let upload = client
         .post(address(&format!("/v1/sessions/{}/recordings", text(&session["id"]))))
@@ -65,6 +67,8 @@ async fn two_gigabytes_are_refused_before_the_first_is_sent() {
         async { request.send().await.unwrap().json::<Value>().await.unwrap() }
     };
     let patient = post("/v1/patients", json!({"pseudonym": "P-1"})).await;
+    let consent = json!({"scope": "assessment", "text_version": "test"});
+    post(&format!("/v1/patients/{}/consents", text(&patient["id"])), consent).await;
     let session = post("/v1/sessions", json!({"patient_id": patient["id"]})).await;
 
     let mut socket = tokio::net::TcpStream::connect(running.addr).await.unwrap();

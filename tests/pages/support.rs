@@ -145,8 +145,10 @@ impl Clinic {
         answer.json()
     }
 
-    /// Uploads a recording to a new session of a patient; the ids of session and recording.
+    /// Uploads a recording to a new session of a patient, who consents; the ids of session and recording.
     pub async fn uploaded(&self, patient: &str, protocol: &str, bytes: Vec<u8>) -> [String; 2] {
+        let consent = json!({"scope": "assessment", "text_version": "home 1"});
+        self.made(&format!("/v1/patients/{patient}/consents"), &consent).await;
         let session = json!({"patient_id": patient, "protocol": protocol, "notes": "slippers <i>on</i>"});
         let session = text(&self.made("/v1/sessions", &session).await["id"]);
         let bearer = format!("Bearer {}", self.key);

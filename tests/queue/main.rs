@@ -4,6 +4,7 @@
 
 mod access;
 mod claiming;
+mod consent;
 mod order;
 mod support;
 mod training;

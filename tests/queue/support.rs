@@ -11,8 +11,8 @@ use surefoot::queue::{Job, JobState, Queue, QueueSettings};
 use surefoot::recording::Header;
 use surefoot::recording::decode::{Format, Inspection, Limits};
 use surefoot::storage::{
-    Access, BlobReader, JobId, ManualClock, NewPatient, NewRecording, NewSession, Places, RecordingId, Role, SessionId,
-    Store, StoredRecording,
+    Access, BlobReader, ConsentScope, JobId, ManualClock, NewConsent, NewPatient, NewRecording, NewSession, PatientId,
+    Places, RecordingId, Role, SessionId, Store, StoredRecording,
 };
 use surefoot::worker::{Assess, AttemptError, Worker};
 use tempfile::TempDir;
@@ -31,6 +31,7 @@ pub struct Bench {
     pub queue: Queue,
     pub access: Access,
     pub session: SessionId,
+    pub patient: PatientId,
 }
 
 impl Bench {
@@ -44,6 +45,13 @@ impl Bench {
         let access = client.access();
         let patient = NewPatient { pseudonym: "P-1".into(), ..NewPatient::default() };
         let patient = store.create_patient(&access, &patient).await.unwrap();
+        let consent = NewConsent {
+            scope: ConsentScope::Assessment,
+            text_version: "test".into(),
+            given_at: datetime!(2026-11-22 07:00 UTC),
+            expires_at: None,
+        };
+        store.record_consent(&access, patient.id, &consent).await.unwrap();
         let session = NewSession {
             patient_id: patient.id,
             started_at: datetime!(2026-11-22 07:00 UTC),
@@ -52,7 +60,7 @@ impl Bench {
             noise_model: None,
         };
         let session = store.create_session(&access, &session).await.unwrap().id;
-        Self { dir, clock, queue, access, session }
+        Self { dir, clock, queue, access, session, patient: patient.id }
     }
 
     /// Stores a recording of these bytes and its job.

@@ -44,6 +44,11 @@ impl RecentSeries {
         }
     }
 
+    /// Forgets everything: somebody's data are to be gone, and nobody keeps a list of whose answers these are.
+    pub fn clear(&self) {
+        *self.lock() = Kept::default();
+    }
+
     fn lock(&self) -> MutexGuard<'_, Kept> {
         // Nothing panics while it holds the lock halfway through a change.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)

@@ -16,7 +16,7 @@ use super::sessions::SessionPath;
 use super::state::AppState;
 use crate::assessment::{JointAngleSettings, LegPoseSettings, Settings};
 use crate::queue::{Job, Submission};
-use crate::storage::{NewRecording, SessionId, StoredRecording, StoredResponse};
+use crate::storage::{ConsentState, NewRecording, SessionId, StoredRecording, StoredResponse};
 use announced::Announced;
 use arrival::Arrived;
 use axum::body::Body;
@@ -53,6 +53,9 @@ pub struct UploadResponse {
 /// its place. The answer names the job that assesses it: `skeleton_fusion` where the recording has inertial units on the
 /// body, `joint_angles` otherwise.
 ///
+/// The session's patient must have consented to assessment (`POST /v1/patients/{id}/consents`); otherwise the answer is 403
+/// with the code `consent_required`, before anything of the body is read.
+///
 /// A digest, when one is sent, is compared with what arrived. An `Idempotency-Key` makes it safe to send the same
 /// upload again: the first answer is repeated and nothing is stored twice. Without one, a second upload is a second
 /// recording.
@@ -68,7 +71,9 @@ pub struct UploadResponse {
     request_body(description = "The recording", content(
         (Vec<u8> = "application/mcap"), (Vec<u8> = "application/octet-stream"), (Object = "application/json"))),
     responses((status = 202, description = "Stored; Location says where its job lives", body = UploadResponse,
-                headers(("Location" = String, description = "Address of the job")))))]
+                headers(("Location" = String, description = "Address of the job"))),
+              (status = 403, description = "The patient has not consented to assessment (`consent_required`), or the role of \
+                the key does not reach this far", body = super::error::Problem, content_type = "application/problem+json")))]
 async fn upload_recording(
     State(state): State<AppState>,
     caller: Caller,
@@ -77,9 +82,16 @@ async fn upload_recording(
     body: Body,
 ) -> Result<Response, ApiError> {
     let session = state.store.session(&caller.access.own(), path.id).await?;
+    if state.config.require_consent {
+        state.store.require_consent(session.patient_id).await?;
+    }
     state.queue.room(&caller.access).await?.map_err(ApiError::Crowded)?;
     let announced = Announced::from_headers(&headers)?;
-    let arrived = arrival::receive(&state, &announced, body).await?;
+    let under_way = state.store.uploads().begin(session.patient_id);
+    let arrived = tokio::select! {
+        arrived = arrival::receive(&state, &announced, body) => arrived?,
+        () = under_way.stopped() => return Err(ApiError::NoConsent(ConsentState::Withdrawn)),
+    };
     announced.check_digest(arrived.sealed.sha256())?;
 
     let fingerprint = fingerprint(session.id, &arrived);
@@ -97,11 +109,29 @@ async fn upload_recording(
     };
     let blob = arrived.sealed.keep().await?;
     let new = NewRecording { session_id: session.id, blob, inspection: arrived.inspection };
+    let submitted = submit(&state, &caller, &announced, fingerprint, &new, &settings).await;
+    if submitted.is_err() {
+        // A withdrawal or an erasure may have come meanwhile: nothing of the upload may stay.
+        state.store.remove_blob_if_unnamed(&new.blob.key).await?;
+    }
+    // Until here: whoever waits for the end of this upload finds nothing of it afterwards.
+    drop(under_way);
+    submitted
+}
+
+async fn submit(
+    state: &AppState,
+    caller: &Caller,
+    announced: &Announced,
+    fingerprint: String,
+    new: &NewRecording,
+    settings: &Settings,
+) -> Result<Response, ApiError> {
     let Some(key) = &announced.idempotency_key else {
-        let (recording, job) = state.queue.submit(&caller.access, &new, &settings).await?;
+        let (recording, job) = state.queue.submit(&caller.access, new, settings).await?;
         return Ok(response(&answer(recording, job).map_err(ApiError::internal)?));
     };
-    match state.queue.submit_once(&caller.access, key, fingerprint, &new, &settings, answer).await? {
+    match state.queue.submit_once(&caller.access, key, fingerprint, new, settings, answer).await? {
         Submission::Stored(answer) => Ok(response(&answer)),
         Submission::Replayed(answer) => Ok(replayed(&answer)),
         Submission::KeyReused => Err(ApiError::IdempotencyKeyReused),

@@ -12,7 +12,8 @@ use crate::api::AppState;
 use crate::api::report::report_of;
 use crate::fall_risk::{Status, change_rule_of, rules_of_measure};
 use crate::report::{MeasureRecord, PatientReport, StatusCounts};
-use crate::storage::PatientId;
+use crate::storage::consents::state_of_scope;
+use crate::storage::{ConsentScope, ConsentState, PatientId};
 use askama::Template;
 use axum::extract::{Query, State};
 use axum::response::Html;
@@ -74,7 +75,9 @@ pub(super) async fn show(
     let as_of = time_of(query.as_of.trim())?;
     let report = report_of(&state.store, &caller, id, as_of).await?;
     let frame = Frame::of(&caller, format!("Report of {}", report.patient.pseudonym));
-    Ok(page(&ReportPage::of(frame, id, report, as_of.is_some()))?)
+    let consents = state.store.consents_of_patient(&caller.access, id).await?;
+    let consent = state_of_scope(&consents, ConsentScope::Assessment, state.store.now());
+    Ok(page(&ReportPage::of(frame, id, report, consent, as_of.is_some()))?)
 }
 
 fn time_of(text: &str) -> Result<Option<OffsetDateTime>, PageError> {
@@ -92,14 +95,21 @@ fn time_of(text: &str) -> Result<Option<OffsetDateTime>, PageError> {
 }
 
 impl ReportPage {
-    fn of(frame: Frame, id: PatientId, report: PatientReport, is_earlier: bool) -> Self {
+    fn of(frame: Frame, id: PatientId, report: PatientReport, consent: ConsentState, is_earlier: bool) -> Self {
         let patient = &report.patient;
         let known = |value: Option<String>| value.unwrap_or_else(|| "not known".to_owned());
+        let consent = match consent {
+            ConsentState::Valid => "given",
+            ConsentState::Missing => "not recorded: nothing can be uploaded",
+            ConsentState::Expired => "at its end: nothing can be uploaded",
+            ConsentState::Withdrawn => "withdrawn: nothing is uploaded or computed",
+        };
         let person = vec![
             ("Age", known(patient.age_years.map(|age| format!("{age} years")))),
             ("Sex for norms", known(patient.sex.map(|sex| format!("{sex:?}").to_lowercase()))),
             ("Height", known(patient.height_m.map(|height| words::quantity(height, "m")))),
             ("Walking aid", yes_no(patient.uses_walking_aid).to_owned()),
+            ("Consent to assessment", consent.to_owned()),
         ];
         let positive = report.findings.iter().filter(|finding| finding.status == Some(Status::Positive));
         let (looked_at, further): (Vec<&MeasureRecord>, Vec<_>) = report.measures.iter().partition(|m| is_looked_at(m));

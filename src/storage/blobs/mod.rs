@@ -151,6 +151,37 @@ impl BlobStore {
         Ok(BlobReader { source, check: Some(Check { digest: Sha256::new(), expected: blob.sha256.clone() }) })
     }
 
+    /// Fails when a blob is not there any more. Inside the transaction that names it: blobs are removed inside of one too, so
+    /// none is removed between this look and the row.
+    ///
+    /// # Errors
+    /// When there is no such blob, or the store fails.
+    pub(crate) async fn require(&self, blob: &StoredBlob) -> Result<(), StorageError> {
+        let found = self.store.head(&Key::from(blob.key.as_str())).await;
+        found.map(drop).map_err(store_error("looking for a blob that was just stored"))
+    }
+
+    /// Removes a blob; one that is not there is removed already.
+    ///
+    /// # Errors
+    /// When the store fails.
+    pub(crate) async fn remove(&self, key: &str) -> Result<(), StorageError> {
+        match self.store.delete(&Key::from(key)).await {
+            Ok(()) | Err(object_store::Error::NotFound { .. }) => {}
+            Err(error) => return Err(store_error("removing a blob")(error)),
+        }
+        let Some(folder) = self.folder.as_ref().and_then(|folder| folder.join(key).parent().map(Path::to_owned)) else {
+            return Ok(());
+        };
+        // The name is gone from the disk too.
+        in_background("removing a blob", move || match File::open(folder) {
+            Ok(folder) => folder.sync_all(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            Err(error) => Err(error),
+        })
+        .await
+    }
+
     /// Keys of all blobs.
     ///
     /// # Errors
@@ -266,7 +297,7 @@ impl BlobWriter {
         self.flush().await?;
         let state = self.settle().await?;
         let sha256 = hex::encode(state.digest.finalize());
-        let key = format!("{}/{sha256}", &sha256[..2]);
+        let key = key_of_digest(&sha256);
         let blob = StoredBlob { key, sha256, size_bytes: self.size_bytes };
         Ok(SealedBlob { store: self.store, part: self.part, lock: state.file, blob })
     }
@@ -393,6 +424,11 @@ impl Source {
             }
         }
     }
+}
+
+/// Where bytes are kept, by their digest in hexadecimal.
+pub(super) fn key_of_digest(sha256: &str) -> String {
+    format!("{}/{sha256}", sha256.get(..2).unwrap_or_default())
 }
 
 async fn in_background<T: Send + 'static>(

@@ -2,6 +2,8 @@
 
 use super::{Bind, Column, Database, Row, Transaction, Value};
 use crate::storage::StorageError;
+use futures::stream::BoxStream;
+use futures::{StreamExt, TryStreamExt};
 use sqlx::{Sqlite, SqliteConnection, SqlitePool};
 
 /// The text of a question in the words of each database.
@@ -131,6 +133,21 @@ impl<'q> Query<'q> {
             .into_iter()
             .map(Row::Postgres)
             .collect()))
+    }
+
+    /// The rows of the answer one after another, however many they are.
+    pub(crate) fn fetch(self, on: &'q Database) -> BoxStream<'q, Result<Row, sqlx::Error>> {
+        match on {
+            Database::Sqlite { readers, .. } => {
+                let query = with_values!(sqlx::query::<Sqlite>(self.text.sqlite), self.values);
+                query.fetch(readers).map_ok(Row::Sqlite).boxed()
+            }
+            #[cfg(feature = "scaleout")]
+            Database::Postgres(pool) => {
+                let query = with_values!(sqlx::query::<sqlx::Postgres>(self.text.postgres), self.values);
+                query.fetch(pool).map_ok(Row::Postgres).boxed()
+            }
+        }
     }
 
     /// The row of an answer that has at most one.

@@ -1,7 +1,7 @@
 //! A file of SQLite.
 
 use super::Database;
-use crate::storage::StorageError;
+use crate::storage::{StorageError, maintenance};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use std::path::Path;
 use std::time::Duration;
@@ -22,10 +22,13 @@ pub(super) async fn open(path: &Path) -> Result<Database, StorageError> {
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
         .busy_timeout(BUSY_TIMEOUT)
-        .foreign_keys(true);
+        .foreign_keys(true)
+        // What a deleted row stood in is overwritten.
+        .pragma("secure_delete", "ON");
     let pool = || SqlitePoolOptions::new().acquire_timeout(ACQUIRE_TIMEOUT).test_before_acquire(false);
     let writer = pool().max_connections(1).connect_with(options.clone()).await?;
     MIGRATIONS.run(&writer).await?;
+    maintenance::clean_once(&writer).await?;
     let readers = pool().max_connections(READERS).connect_with(options.pragma("query_only", "ON")).await?;
     Ok(Database::Sqlite { writer, readers })
 }

@@ -93,10 +93,24 @@ impl TestApp {
         Call::new(self, method, path)
     }
 
-    /// Id of a new patient.
+    /// Id of a new patient, who consents to assessment.
     pub async fn patient(&self, pseudonym: &str) -> String {
+        let patient = self.patient_without_consent(pseudonym).await;
+        self.consent(&patient, &self.admin).await;
+        patient
+    }
+
+    /// Id of a new patient.
+    pub async fn patient_without_consent(&self, pseudonym: &str) -> String {
         let made = self.post("/v1/patients").json(&json!({"pseudonym": pseudonym})).send().await;
         made.expect(StatusCode::CREATED)["id"].as_str().unwrap().to_owned()
+    }
+
+    /// Records a patient's consent to assessment.
+    pub async fn consent(&self, patient: &str, key: &str) {
+        let consent = json!({"scope": "assessment", "text_version": "test"});
+        let recorded = self.post(&format!("/v1/patients/{patient}/consents")).key(key).json(&consent).send().await;
+        recorded.expect(StatusCode::CREATED);
     }
 
     /// Id of a new session of a new patient.
