@@ -115,7 +115,7 @@ fn read_depth(bytes: &[u8]) -> bool {
 }
 
 const CAMERA: &str =
-    r#"{"width": 8, "height": 6, "unit": "raw11", "rate_hz": 30, "fx": 10, "fy": 10, "cx": 4, "cy": 3}"#;
+    r#"{"width": 8, "height": 6, "unit": "raw11", "rate_hz": 30, "fx": 580, "fy": 580, "cx": 4, "cy": 3}"#;
 
 fn camera_file_seeds() -> Vec<Vec<u8>> {
     vec![CAMERA.as_bytes().to_vec()]

@@ -105,6 +105,13 @@ fn with_messages_changed(bytes: &[u8], random: &mut impl Rng) -> Option<Vec<u8>>
     let kind = random.random_range(0..8);
     let options = WriteOptions::new().profile("surefoot");
     let mut writer = Writer::with_options(Cursor::new(Vec::new()), options).ok()?;
+    let summary = mcap::Summary::read(bytes).ok()??;
+    for index in &summary.metadata_indexes {
+        writer.write_metadata(&mcap::read::metadata(bytes, index).ok()?).ok()?;
+    }
+    for index in &summary.attachment_indexes {
+        writer.attach(&mcap::read::attachment(bytes, index).ok()?).ok()?;
+    }
     for (i, message) in messages.iter().enumerate() {
         let mut message = message.clone();
         if i == victim {
