@@ -11,8 +11,9 @@ use std::time::Duration;
 
 /// Version of the way rows are removed, kept in the database file: from 1 on with `secure_delete` from its beginning.
 const CLEAN: i64 = 1;
-/// Looks for a moment without a reader of the old state before it is left for later.
-const LOOKS: u32 = 20;
+/// Looks for a moment without a reader of the old state before it is left for later; each waits as long as SQLite waits for
+/// another process, and nobody writes meanwhile.
+const LOOKS: u32 = 2;
 /// Pause between two looks.
 const PAUSE: Duration = Duration::from_millis(100);
 

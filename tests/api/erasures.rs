@@ -23,11 +23,11 @@ fn files_with(folder: &Path, marks: &[Vec<u8>]) -> Vec<String> {
     found
 }
 
-/// A recording whose header holds the marker.
+/// A recording whose header holds the marker; JSON, because nothing in it is compressed.
 fn marked_recording() -> Vec<u8> {
-    let mut recording = samples::recording(60);
-    recording.header.protocol = Some(format!("seen by {MARKER}"));
-    surefoot::recording::encode::mcap(&recording).unwrap()
+    let mut recording: Value = serde_json::from_slice(&samples::json_recording()).unwrap();
+    recording["header"]["protocol"] = json!(format!("seen by {MARKER}"));
+    recording.to_string().into_bytes()
 }
 
 fn erase<'a>(app: &'a TestApp, patient: &str, pseudonym: &str) -> crate::support::Call<'a> {
@@ -44,7 +44,7 @@ async fn everything_of_an_erased_patient_is_gone_from_answers_and_files() {
     let session = app.post("/v1/sessions").json(&new).send().await.expect(StatusCode::CREATED);
     let session = text(&session["id"]).to_owned();
     let upload = app.post(&format!("/v1/sessions/{session}/recordings")).header("idempotency-key", MARKER);
-    let uploaded = upload.body("application/mcap", marked_recording()).send().await.expect(StatusCode::ACCEPTED);
+    let uploaded = upload.body("application/json", marked_recording()).send().await.expect(StatusCode::ACCEPTED);
     app.run_pending_jobs().await;
     let answers = json!({"falls_12_months": 1, "lives_in_community": true});
     app.post(&format!("/v1/patients/{patient}/questionnaires")).json(&answers).send().await.expect(StatusCode::CREATED);
@@ -66,7 +66,7 @@ async fn everything_of_an_erased_patient_is_gone_from_answers_and_files() {
     let mut marks: Vec<Vec<u8>> = ids.iter().map(raw).collect();
     marks.extend(ids.iter().map(|id| id.as_bytes().to_vec()));
     marks.push(MARKER.as_bytes().to_vec());
-    assert!(files_with(app.folder.path(), &marks).len() >= 3);
+    assert!(files_with(app.folder.path(), &marks).len() >= 2, "database or its log, and blob");
 
     let clinician = app.key(Role::Clinician).await;
     erase(&app, &patient, &pseudonym).key(&clinician).send().await.refused(403, "forbidden");

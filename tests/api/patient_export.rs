@@ -15,7 +15,7 @@ fn files(archive: &[u8]) -> BTreeMap<String, Vec<u8>> {
         let mut file = archive.by_index(i).unwrap();
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).unwrap();
-        found.insert(file.name().to_owned(), bytes);
+        found.insert(file.name().unwrap().into_owned(), bytes);
     }
     found
 }

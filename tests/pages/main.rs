@@ -4,6 +4,7 @@
 
 mod api_with_cookie;
 mod browser;
+mod privacy;
 mod reading;
 mod sign_in;
 mod support;
