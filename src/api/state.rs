@@ -2,6 +2,7 @@
 
 use super::metrics;
 use super::series::RecentSeries;
+use super::upload::resumable::Transfers;
 use crate::config::Config;
 use crate::queue::Queue;
 use crate::recording::decode::Limits;
@@ -28,6 +29,8 @@ pub struct AppState {
     pub limits: Limits,
     /// One permit for each JSON recording in memory.
     pub json_uploads: Arc<Semaphore>,
+    /// Resumable uploads under way.
+    pub transfers: Transfers,
     /// Series that were read a moment ago.
     pub recent_series: RecentSeries,
     /// The numbers for the operator.
@@ -42,12 +45,14 @@ impl AppState {
     /// # Errors
     /// When the process has another metrics recorder already.
     pub fn new(queue: Queue, config: Config, limits: Limits) -> Result<Self, BuildError> {
+        let transfers = Transfers::new(&config);
         Ok(Self {
             store: queue.store().clone(),
             queue,
             config: Arc::new(config),
             limits,
             json_uploads: Arc::new(Semaphore::new(JSON_UPLOADS_AT_ONCE)),
+            transfers,
             recent_series: RecentSeries::default(),
             metrics: metrics::recorder()?,
             shutdown: CancellationToken::new(),

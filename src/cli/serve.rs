@@ -1,6 +1,7 @@
 //! `surefoot serve`: the service on one machine.
 
 use crate::api::AppState;
+use crate::api::upload::resumable;
 use crate::config::Config;
 use crate::pages;
 use crate::queue::{Messenger, Queue, QueueSettings};
@@ -162,6 +163,8 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
             metrics.run_upkeep();
         }
     });
+    let uploads = state.clone();
+    workers.spawn(async move { resumable::keep_in_order(&uploads).await });
     let router = pages::router(state);
     let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let server = tokio::spawn(serving.into_future());

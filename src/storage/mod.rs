@@ -34,6 +34,7 @@ pub mod patients;
 mod places;
 pub mod recent;
 pub mod recordings;
+pub mod resumable;
 pub(crate) mod row;
 pub mod series;
 pub mod sessions;
@@ -48,7 +49,7 @@ pub use entries::{Entry, Occasion};
 pub use error::StorageError;
 pub use id::{
     AssessmentId, ClientId, JobId, MeasureId, MeasurementId, NoiseModelId, OrganisationId, PatientId, QuestionnaireId,
-    RecordingId, SessionId, TrainingPlanId,
+    RecordingId, ResumableUploadId, SessionId, TrainingPlanId,
 };
 pub use idempotency::StoredResponse;
 pub use measures::MeasureFilter;
@@ -59,6 +60,7 @@ pub use page_sessions::PageToken;
 pub use patients::{NewPatient, Patient, PatientFilter, Sex};
 pub use places::Places;
 pub use recordings::{NewRecording, RecordingFilter, StoredRecording};
+pub use resumable::{PartialFiles, ResumableState, ResumableUpload, UploadStates};
 pub use series::{Parts, SeriesQuery, SeriesSlice};
 pub use sessions::{NewSession, Session, SessionFilter};
 
@@ -77,6 +79,7 @@ pub struct Store {
     blobs: BlobStore,
     clock: Arc<dyn Clock>,
     known_keys: KnownKeys,
+    partial_files: PartialFiles,
 }
 
 impl Store {
@@ -103,7 +106,8 @@ impl Store {
     pub async fn open_at(places: &Places, clock: Arc<dyn Clock>) -> Result<Self, StorageError> {
         let blobs = places.open_blobs().await?;
         let database = places.open_database().await?;
-        Ok(Self { database, blobs, clock, known_keys: KnownKeys::default() })
+        let partial_files = PartialFiles::in_directory(&places.data_dir);
+        Ok(Self { database, blobs, clock, known_keys: KnownKeys::default(), partial_files })
     }
 
     /// The blobs.

@@ -18,6 +18,7 @@ mod performance;
 mod problems;
 mod recordings;
 mod report;
+mod resumable;
 mod series;
 mod serving;
 mod sessions;
