@@ -2,6 +2,7 @@
 
 mod disk_full;
 mod kills;
+mod resumed;
 #[cfg(feature = "scaleout")]
 mod scaleout;
 #[cfg(feature = "scaleout")]

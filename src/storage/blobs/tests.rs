@@ -111,3 +111,23 @@ async fn a_blob_that_is_not_there_is_an_error_and_no_panic() {
     let absent = StoredBlob { key: "00/absent".into(), sha256: "0".repeat(64), size_bytes: 1 };
     assert!(matches!(store.reader(&absent).await, Err(StorageError::Blob { .. })));
 }
+
+#[tokio::test]
+async fn a_file_becomes_a_blob_and_stays_under_its_own_name_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("upload");
+    fs::write(&file, b"abc").unwrap();
+    let sha256 = hex::encode(Sha256::digest(b"abc"));
+    let local = BlobStore::open(folder.path()).await.unwrap();
+    let remote = BlobStore::in_object_store(folder.path().join("elsewhere"), Arc::new(InMemory::new())).await.unwrap();
+    for store in [local, remote] {
+        // The second time is that of a process which died before it could say that the blob is stored.
+        for _ in 0..2 {
+            let blob = store.keep_file(&file, sha256.clone(), 3).await.unwrap();
+            assert_eq!(read_back(&store, &blob).await, b"abc");
+            assert_eq!(fs::read(&file).unwrap(), b"abc");
+        }
+    }
+    assert_eq!(entries(&folder.path().join(PART_FOLDER)), 0);
+    assert_eq!(entries(&folder.path().join("elsewhere")), 0);
+}

@@ -37,18 +37,19 @@ pub(super) async fn receive(
     let id = protocol_id(upload.id)?;
     let at = headers.upload_offset.ok_or_else(|| ApiError::field("Upload-Offset", "must be there"))?;
     let known = offset_of(protocol, &id).await?;
+    let missing = upload.length_bytes.saturating_sub(known);
+    let announced = headers.content_length;
+    let mut chunks = Chunks::new(body, missing);
     if at != known {
+        chunks.drain().await;
         return Err(offset_mismatch(known, at));
     }
-    let missing = upload.length_bytes.saturating_sub(known);
-    if headers.content_length.is_some_and(|length| length > missing) {
+    if announced.is_some_and(|length| length > missing) {
         return Err(ApiError::TooLarge(missing));
     }
     if missing == 0 {
         return Ok(known);
     }
-    let announced = headers.content_length;
-    let mut chunks = Chunks::new(body, missing);
     if has_checksum {
         return whole(protocol, &id, headers, chunks).await;
     }
