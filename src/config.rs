@@ -29,6 +29,8 @@ pub struct Config {
     pub max_recording_bytes: u64,
     /// Largest accepted JSON recording, bytes; a JSON document is parsed in memory.
     pub max_json_recording_bytes: u64,
+    /// Hours for which the bytes of an unfinished resumable upload are kept after the last of them arrived.
+    pub resumable_upload_hours: u64,
     /// Time after which a job whose worker fell silent runs again, seconds.
     pub lease_s: u64,
     /// Whether workers assess recordings whose truth is known before they take jobs; it costs some seconds at the start.
@@ -151,6 +153,7 @@ impl Default for Config {
             workers: 2,
             max_recording_bytes: 1 << 30,
             max_json_recording_bytes: 32 << 20,
+            resumable_upload_hours: 24,
             lease_s: 30,
             canary: true,
             max_waiting_jobs: 20_000,

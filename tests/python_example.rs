@@ -1,5 +1,5 @@
-//! The Python examples: a recording that decodes, and a home app that records, uploads, waits and shows the report. They run
-//! when Python with the `mcap` package is there.
+//! The Python examples: a recording that decodes, a home app that records, uploads, waits and shows the report, and uploads that
+//! resume. They run when Python is there, with the `mcap` package where a recording is written.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -50,20 +50,70 @@ fn the_home_app_records_uploads_waits_and_shows_the_report() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let arguments = ["serve", "--json", "--listen", "127.0.0.1:0", "--data-dir"];
-    let mut service = Command::new(env!("CARGO_BIN_EXE_surefoot"));
-    let service = service.args(arguments).arg(folder.path().join("data")).stdout(Stdio::piped()).stderr(Stdio::null());
-    let mut service = Service(service.spawn().unwrap());
-    let mut started = String::new();
-    BufReader::new(service.0.stdout.take().unwrap()).read_line(&mut started).unwrap();
-    let started: serde_json::Value = serde_json::from_str(&started).unwrap();
+    let (_service, address, key) = started(&folder.path().join("data"));
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/python/home_app.py");
-    let arguments = [&started["address"], &started["admin_key"]].map(|value| value.as_str().unwrap());
-    let app = Command::new("python3").arg(script).args(arguments).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
+    let app = Command::new("python3")
+        .arg(script)
+        .args([&address, &key])
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
     let said = String::from_utf8_lossy(&app.stdout);
     assert!(app.status.success(), "{said}{}", String::from_utf8_lossy(&app.stderr));
     assert!(said.contains("assessed: measured, 3 repetitions"), "{said}");
     assert!(said.contains("Report of home-") && said.contains("not a diagnosis"), "{said}");
+}
+
+#[test]
+fn the_client_brings_a_recording_in_pieces_and_goes_on_where_it_broke_off() {
+    const SCRIPT: &str = "
+import sys
+from surefoot_client import Client
+address, key, path = sys.argv[1:]
+client = Client(address, key)
+patient = client.create_patient(body={'pseudonym': 'P-1'})
+session = client.create_session(body={'patient_id': patient['id']})['id']
+upload = client.begin_upload(session, path)
+with open(path, 'rb') as file:
+    headers = {'Tus-Resumable': '1.0.0', 'Upload-Offset': '0', 'Content-Type': 'application/offset+octet-stream'}
+    client.request('PATCH', '/v1/uploads/' + upload, file.read(777), headers)
+recording, job = client.resume_upload(upload, path, piece_bytes=10_000)
+assert client.read_job(id=job)['recording_id'] == recording
+with open(path, 'rb') as file:
+    assert client.request('GET', f'/v1/recordings/{recording}/content') == file.read()
+again, _ = client.upload_file(session, path, resume_above=0, piece_bytes=50_000)
+assert again != recording
+";
+    if !Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success()) {
+        println!("skipped: python3 is not there");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (service, address, key) = started(&folder.path().join("data"));
+    let path = folder.path().join("knee.mcap");
+    let mut simulate = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    assert!(
+        simulate.args(["simulate", "back_knee", "--out"]).arg(&path).stdout(Stdio::null()).status().unwrap().success()
+    );
+    let mut python = Command::new("python3");
+    python.args(["-c", SCRIPT, &address, &key]).arg(path).env("PYTHONDONTWRITEBYTECODE", "1");
+    python.env("PYTHONPATH", concat!(env!("CARGO_MANIFEST_DIR"), "/examples/python"));
+    let output = python.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    drop(service);
+}
+
+/// A service on a data directory, its address and its first key.
+fn started(data: &std::path::Path) -> (Service, String, String) {
+    let arguments = ["serve", "--json", "--listen", "127.0.0.1:0", "--data-dir"];
+    let mut service = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    let service = service.args(arguments).arg(data).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut service = Service(service.spawn().unwrap());
+    let mut started = String::new();
+    BufReader::new(service.0.stdout.take().unwrap()).read_line(&mut started).unwrap();
+    let started: serde_json::Value = serde_json::from_str(&started).unwrap();
+    let [address, key] = [&started["address"], &started["admin_key"]].map(|value| value.as_str().unwrap().to_owned());
+    (service, address, key)
 }
 
 /// Ends with the test.

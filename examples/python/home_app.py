@@ -10,13 +10,10 @@ The recording is the one of `write_recording.py`: a stick figure that does three
 administrator's here, because a device's may not read reports.
 """
 
-import hashlib
 import os
 import sys
 import tempfile
 import time
-import urllib.error
-import uuid
 
 import write_recording
 from surefoot_client import Client, Problem
@@ -30,26 +27,6 @@ def record(path):
 def ask_for_consent():
     """What the patient has agreed to; put your text and your signature pad here. Without it the service takes no recording."""
     return {"scope": "assessment", "text_version": "example 1"}
-
-
-def upload(client, session_id, path, attempts=3):
-    """Uploads a recording; checked on arrival, and after a broken connection sent again under the same key."""
-    with open(path, "rb") as file:
-        content = file.read()
-    key = str(uuid.uuid4())
-    for attempt in range(1, attempts + 1):
-        try:
-            return client.upload_recording(
-                id=session_id,
-                body=content,
-                content_type="application/mcap",
-                X_Content_SHA256=hashlib.sha256(content).hexdigest(),
-                Idempotency_Key=key,
-            )
-        except urllib.error.URLError:
-            if attempt == attempts:
-                raise
-            time.sleep(attempt)
 
 
 def show(report):
@@ -81,10 +58,10 @@ def main(address, key):
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "squats.mcap")
         record(path)
-        uploaded = upload(client, session["id"], path)
-    print(f"uploaded: recording {uploaded['recording']['id']}")
+        recording_id, job_id = client.upload_file(session["id"], path)
+    print(f"uploaded: recording {recording_id}")
     progress = lambda job: print(f"  {job['state']}: {job['progress']['step']}", flush=True)
-    assessment = client.read_assessment(id=client.follow(uploaded["job"]["id"], progress))
+    assessment = client.read_assessment(id=client.follow(job_id, progress))
     performance = assessment["performance"]
     print(f"assessed: {performance['status']}, {len(performance['repetitions'])} repetitions {performance['reason']}")
     show(client.read_report(id=patient["id"]))

@@ -6,16 +6,27 @@
     client.record_consent(id=patient["id"], body={"scope": "assessment", "text_version": "2026-1"})
     client.read_report(id=patient["id"])
 
-Parameters of path, query and header are given by their names (`-` as `_`). Needs nothing but Python.
+`upload_file` brings a recording to a session, however bad the line is. Parameters of path, query and header are given by their names (`-` as `_`). Needs nothing but Python.
 """
 
+import base64
+import hashlib
+import http.client
 import json
+import os
 import time
 import urllib.error
 import urllib.parse
 import urllib.request
+import uuid
 
 METHODS = ("get", "post", "put", "patch", "delete")
+RESUME_ABOVE = 4 << 20
+"""Recordings above this size, bytes, go in pieces that resume."""
+PIECE_BYTES = 8 << 20
+"""What one request carries at most, bytes."""
+BROKEN = (urllib.error.URLError, http.client.HTTPException, ConnectionError, TimeoutError)
+"""What a line that breaks raises."""
 
 
 class Problem(Exception):
@@ -26,6 +37,35 @@ class Problem(Exception):
         self.status = document["status"]
         self.code = document["code"]
         self.errors = document.get("errors", [])
+
+
+def problem_of(error):
+    """The problem that an answer holds; a proxy on the way may have written none."""
+    content = error.read()
+    try:
+        return Problem(json.loads(content))
+    except (ValueError, KeyError, TypeError):
+        return Problem({"status": error.code, "code": "refused", "detail": str(error.reason)})
+
+
+def persistently(request, attempts=10):
+    """The answer to a request that may be sent again, also over a line that breaks."""
+    for attempt in range(1, attempts + 1):
+        try:
+            return request()
+        except BROKEN:
+            if attempt == attempts:
+                raise
+            time.sleep(min(attempt, 5))
+
+
+def digest_of(path):
+    """SHA-256 of a file, hexadecimal."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 class Operation:
@@ -75,8 +115,65 @@ class Client:
             with urllib.request.urlopen(request, timeout=300) as answer:
                 content, kind = answer.read(), answer.headers.get_content_type()
         except urllib.error.HTTPError as error:
-            raise Problem(json.loads(error.read())) from None
+            raise problem_of(error) from None
         return json.loads(content) if kind.endswith("json") else content
+
+    def upload_file(
+        self, session_id, path, content_type="application/mcap", resume_above=RESUME_ABOVE, piece_bytes=PIECE_BYTES
+    ):
+        """Uploads a recording; the ids of the recording and of the job that assesses it.
+
+        A small one is sent at once, and after a broken connection again under the same key; a large one goes on where it broke
+        off. An app that may be killed itself keeps the id of `begin_upload` and goes on with `resume_upload`.
+        """
+        if os.path.getsize(path) > resume_above:
+            return self.resume_upload(self.begin_upload(session_id, path, content_type), path, piece_bytes)
+        with open(path, "rb") as file:
+            content = file.read()
+        key = str(uuid.uuid4())
+        stored = persistently(
+            lambda: self.upload_recording(
+                id=session_id,
+                body=content,
+                content_type=content_type,
+                X_Content_SHA256=hashlib.sha256(content).hexdigest(),
+                Idempotency_Key=key,
+            )
+        )
+        return stored["recording"]["id"], stored["job"]["id"]
+
+    def begin_upload(self, session_id, path, content_type="application/mcap"):
+        """Begins an upload that can resume; its id."""
+        said = {"filetype": content_type, "sha256": digest_of(path)}
+        said = ",".join(f"{key} {base64.b64encode(value.encode()).decode()}" for key, value in said.items())
+        headers = {"Tus-Resumable": "1.0.0", "Upload-Length": str(os.path.getsize(path)), "Upload-Metadata": said}
+        begin = lambda: self.request("POST", f"/v1/sessions/{session_id}/uploads", headers=headers)
+        return persistently(begin)["id"]
+
+    def resume_upload(self, upload_id, path, piece_bytes=PIECE_BYTES):
+        """Goes on with an upload to its end; the ids of the recording and of the job that assesses it."""
+        address, size = f"/v1/uploads/{upload_id}", os.path.getsize(path)
+        with open(path, "rb") as file:
+            while True:
+                upload = persistently(lambda: self.request("GET", address))
+                if upload["state"] == "refused":
+                    raise Problem(upload["problem"])
+                if upload["state"] == "stored":
+                    return upload["recording_id"], upload["job_id"]
+                at = upload["received_bytes"]
+                if at < size:
+                    file.seek(at)
+                piece = file.read(piece_bytes) if at < size else b""
+                headers = {"Content-Type": "application/offset+octet-stream", "Tus-Resumable": "1.0.0"}
+                try:
+                    self.request("PATCH", address, piece, headers | {"Upload-Offset": str(at)})
+                except BROKEN:
+                    time.sleep(1)
+                except Problem as problem:
+                    # Another number of bytes has arrived, or an earlier request is still being worked off: look again.
+                    if problem.status not in (400, 408, 409, 423, 460, 503, 507):
+                        raise
+                    time.sleep(5 if problem.status in (503, 507) else 1)
 
     def follow(self, job_id, show=lambda job: None, every_s=0.5):
         """Waits for the end of a job; the id of its assessment.

@@ -108,6 +108,8 @@ pub enum ApiError {
     Crowded(Crowded),
     /// The disk is full.
     OutOfSpace,
+    /// A problem in its final form: one that was told before, or of a protocol with problems of its own.
+    Told(Box<Problem>),
     /// Our fault: logged, not told.
     Internal(anyhow::Error),
 }
@@ -196,6 +198,7 @@ impl ApiError {
                               lost; keep the recording and send it again later.";
                 Problem::new(S::INSUFFICIENT_STORAGE, "out_of_space", detail)
             }
+            Self::Told(problem) => return (**problem).clone(),
             Self::Internal(_) => Problem::of_status(S::INTERNAL_SERVER_ERROR),
         }
         .with_errors(self.field_errors())
@@ -258,7 +261,7 @@ fn listed(errors: &[FieldError]) -> String {
 }
 
 impl Problem {
-    fn new(status: StatusCode, code: &str, detail: impl Into<String>) -> Self {
+    pub(super) fn new(status: StatusCode, code: &str, detail: impl Into<String>) -> Self {
         Self {
             problem_type: format!("urn:surefoot:problem:{code}"),
             title: title(status, code).to_owned(),
@@ -328,6 +331,11 @@ fn title(status: StatusCode, code: &str) -> &'static str {
         "not_found" => "Not found",
         "out_of_space" => "No room left",
         "consent_required" => "The patient's consent is needed",
+        "offset_mismatch" => "The upload goes on elsewhere",
+        "upload_expired" => "The upload has expired",
+        "tus_version" => "The version of tus is not known here",
+        "upload_checksum_mismatch" => "The checksum does not match",
+        "upload_locked" => "The upload is busy",
         _ if status == StatusCode::UNPROCESSABLE_ENTITY => "The recording was refused",
         _ => status.canonical_reason().unwrap_or("Refused"),
     }

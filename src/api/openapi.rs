@@ -221,9 +221,10 @@ fn name_contents(document: &mut Value) {
         for contents in messages.into_iter().filter_map(|message| message.get_mut("content")?.as_object_mut()) {
             for (kind, content) in contents {
                 match kind.as_str() {
-                    "application/mcap" | "application/octet-stream" | "application/zip" => {
-                        content["schema"] = bytes.clone()
-                    }
+                    "application/mcap"
+                    | "application/octet-stream"
+                    | "application/offset+octet-stream"
+                    | "application/zip" => content["schema"] = bytes.clone(),
                     "text/event-stream" => content["schema"] = event.clone(),
                     _ => {}
                 }
@@ -233,20 +234,25 @@ fn name_contents(document: &mut Value) {
 }
 
 /// Where the ids of an answer lead: (operation, status, place of the id in the body, operations that take it as `id`).
-const LINKS: [(&str, &str, &str, &[&str]); 12] = [
+const LINKS: [(&str, &str, &str, &[&str]); 14] = [
     ("create_patient", "201", "/id", &["read_patient", "update_patient", "record_consent"]),
-    ("create_session", "201", "/id", &["read_session", "list_recordings", "upload_recording"]),
+    ("create_session", "201", "/id", &["read_session", "list_recordings", "upload_recording", "create_upload"]),
     ("create_client", "201", "/client/id", &["revoke_client", "rotate_client"]),
     ("create_share", "201", "/id", &["revoke_share"]),
     ("create_user", "201", "/user/id", &["reset_user", "disable_user"]),
     ("upload_recording", "202", "/recording/id", &["read_recording", "read_recording_content", "create_job"]),
     ("upload_recording", "202", "/job/id", &["read_job", "read_job_events", "cancel_job"]),
+    ("create_upload", "201", "/id", &["read_upload", "read_upload_offset", "continue_upload", "terminate_upload"]),
+    ("read_upload", "200", "/job_id", &["read_job"]),
     ("create_job", "202", "/id", &["read_job", "read_job_events", "cancel_job"]),
     ("create_noise_model", "202", "/id", &["read_job", "read_job_events", "cancel_job"]),
     ("read_job", "200", "/noise_model_id", &["read_noise_model"]),
     ("read_job", "200", "/assessment_id", &["read_assessment", "read_series"]),
     ("list_assessments", "200", "/items/0/id", &["read_assessment", "read_series"]),
 ];
+
+/// Operations that take the id of an upload, as `upload_id`.
+const UPLOADS: [&str; 4] = ["read_upload", "read_upload_offset", "continue_upload", "terminate_upload"];
 
 /// Says where the ids of answers lead.
 fn add_links(document: &mut Value) {
@@ -256,8 +262,9 @@ fn add_links(document: &mut Value) {
         for (_, status, pointer, targets) in LINKS.iter().filter(|(from, ..)| *from == name) {
             for target in *targets {
                 let id = format!("$response.body#{pointer}");
+                let parameter = if UPLOADS.contains(target) { "upload_id" } else { "id" };
                 operation["responses"][status]["links"][target] =
-                    json!({"operationId": target, "parameters": {"id": id}});
+                    json!({"operationId": target, "parameters": {parameter: id}});
             }
         }
         if name == "create_patient" {

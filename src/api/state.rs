@@ -4,6 +4,7 @@ use super::metrics;
 use super::oidc::{Oidc, OidcError};
 use super::rates::Rates;
 use super::series::RecentSeries;
+use super::upload::resumable::Transfers;
 use crate::config::Config;
 use crate::queue::Queue;
 use crate::recording::decode::Limits;
@@ -44,6 +45,8 @@ pub struct AppState {
     pub limits: Limits,
     /// One permit for each JSON recording in memory.
     pub json_uploads: Arc<Semaphore>,
+    /// Resumable uploads under way.
+    pub transfers: Transfers,
     /// Series that were read a moment ago.
     pub recent_series: RecentSeries,
     /// How many requests of whom are served.
@@ -62,6 +65,7 @@ impl AppState {
     /// # Errors
     /// When the process has another metrics recorder already, or the identity provider's settings do not fit.
     pub fn new(queue: Queue, config: Config, limits: Limits) -> Result<Self, StateError> {
+        let transfers = Transfers::new(&config);
         Ok(Self {
             oidc: Oidc::of(&config.oidc)?.map(Arc::new),
             store: queue.store().clone(),
@@ -71,6 +75,7 @@ impl AppState {
             config: Arc::new(config),
             limits,
             json_uploads: Arc::new(Semaphore::new(JSON_UPLOADS_AT_ONCE)),
+            transfers,
             recent_series: RecentSeries::default(),
             metrics: metrics::recorder()?,
             shutdown: CancellationToken::new(),

@@ -2,6 +2,7 @@
 
 use super::housekeeping;
 use crate::api::AppState;
+use crate::api::upload::resumable;
 use crate::config::Config;
 use crate::pages;
 use crate::queue::{Messenger, Queue, QueueSettings};
@@ -198,6 +199,8 @@ pub async fn start(config: Config) -> anyhow::Result<Running> {
         }
     });
     workers.spawn(housekeeping::run(state.store.clone(), rules, stop.clone()));
+    let uploads = state.clone();
+    workers.spawn(async move { resumable::keep_in_order(&uploads).await });
     let router = pages::router(state).into_make_service_with_connect_info::<SocketAddr>();
     let serving = axum::serve(listener, router).with_graceful_shutdown(stop.clone().cancelled_owned());
     let server = tokio::spawn(serving.into_future());

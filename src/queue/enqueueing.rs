@@ -8,7 +8,8 @@ use crate::storage::clock::ms_from_time;
 use crate::storage::database::{Transaction, query};
 use crate::storage::idempotency::{KeptAnswer, keep_answer, kept_answer};
 use crate::storage::{
-    Access, JobId, NewRecording, RecordingId, StorageError, StoredRecording, StoredResponse, recordings, row,
+    Access, JobId, NewRecording, RecordingId, ResumableUploadId, StorageError, StoredRecording, StoredResponse,
+    recordings, resumable, row,
 };
 
 /// What became of an upload that may have been sent before.
@@ -77,6 +78,32 @@ impl Queue {
         self.wake_worker(id);
         self.announce(id);
         Ok(Submission::Stored(kept.response))
+    }
+
+    /// Like [`Queue::submit`], once per resumable upload, which is over with it; false when it was over already, and nothing
+    /// was stored.
+    ///
+    /// # Errors
+    /// `NotFound` (`session`) when the session is out of the caller's reach.
+    pub async fn submit_resumed(
+        &self,
+        access: &Access,
+        upload: ResumableUploadId,
+        new: &NewRecording,
+        settings: &Settings,
+    ) -> Result<bool, StorageError> {
+        let now = self.store.now();
+        let mut transaction = self.store.begin().await?;
+        if !resumable::is_receiving(&mut transaction, upload).await? {
+            return Ok(false);
+        }
+        let recording = recordings::insert(&mut transaction, access, new, now).await?;
+        let job = self.insert(&mut transaction, access, recording.id, settings).await?;
+        resumable::set_stored(&mut transaction, upload, recording.id, job.id, now).await?;
+        transaction.commit().await?;
+        self.wake_worker(job.id);
+        self.announce(job.id);
+        Ok(true)
     }
 
     /// Asks for another assessment of a recording that is already stored.

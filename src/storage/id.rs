@@ -72,6 +72,8 @@ ids! {
     SessionId;
     /// Identity of a recording: one upload in a session.
     RecordingId;
+    /// Identity of an upload that may go on where it broke off.
+    ResumableUploadId;
     /// Identity of a job: the work on one recording.
     JobId;
     /// Identity of an assessment: one pipeline's result on one recording.

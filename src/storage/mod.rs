@@ -39,6 +39,7 @@ pub mod patients;
 mod places;
 pub mod recent;
 pub mod recordings;
+pub mod resumable;
 pub mod retention;
 pub(crate) mod row;
 pub mod series;
@@ -60,7 +61,7 @@ pub use erasure::{ErasedBlob, Erasure, ErasureReason};
 pub use error::StorageError;
 pub use id::{
     AssessmentId, ClientId, ConsentId, ErasureId, JobId, MeasureId, MeasurementId, NoiseModelId, OrganisationId,
-    PatientId, QuestionnaireId, RecordingId, SessionId, ShareId, TrainingPlanId,
+    PatientId, QuestionnaireId, RecordingId, ResumableUploadId, SessionId, ShareId, TrainingPlanId,
 };
 pub use idempotency::StoredResponse;
 pub use key_rotation::Rotation;
@@ -72,6 +73,7 @@ pub use page_sessions::PageToken;
 pub use patients::{NewPatient, Patient, PatientFilter, Sex};
 pub use places::Places;
 pub use recordings::{NewRecording, RecordingFilter, StoredRecording};
+pub use resumable::{PartialFiles, ResumableState, ResumableUpload, UploadStates};
 pub use series::{Parts, SeriesQuery, SeriesSlice};
 pub use sessions::{NewSession, Session, SessionFilter};
 pub use shares::Share;
@@ -101,6 +103,7 @@ pub struct Store {
     uploads: Uploads,
     audit_secret: audit::Secret,
     erasure_list: PathBuf,
+    partial_files: PartialFiles,
 }
 
 impl Store {
@@ -136,6 +139,7 @@ impl Store {
             clock,
             known_keys: KnownKeys::default(),
             password_turns: Arc::new(Semaphore::new(PASSWORDS_AT_ONCE)),
+            partial_files: PartialFiles::in_directory(&places.data_dir),
             uploads: Uploads::default(),
             audit_secret,
             erasure_list: places.data_dir.join(erasure::LIST_FILE),

@@ -26,6 +26,7 @@ mod problems;
 mod rates;
 mod recordings;
 mod report;
+mod resumable;
 mod series;
 mod serving;
 mod sessions;

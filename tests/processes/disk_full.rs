@@ -66,3 +66,38 @@ async fn a_full_disk_is_told_and_costs_nothing_that_was_stored() {
     }
     assert_eq!(app.list(&format!("/v1/sessions/{session}/recordings")).await.len(), stored.len());
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_disk_keeps_what_had_arrived_of_an_upload_and_it_goes_on_when_there_is_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let Some(disk) = SmallDisk::mount(&data, "6m") else {
+        println!("skipped: this process may not mount a small file system");
+        return;
+    };
+    let service = Service::start(&data, &[("SUREFOOT_WORKERS", "0")]);
+    let app = App::new(&service, service.admin_key.as_ref().unwrap());
+    let session = app.session("P-1").await;
+    let content = recording(400, 0);
+    assert!(content.len() > 8 << 20, "{} bytes fit", content.len());
+    let upload = app.begin_upload(&session, content.len(), "application/json").await;
+
+    let mut offset = 0;
+    let refused = loop {
+        let end = (offset + (256 << 10)).min(content.len());
+        match app.continue_upload(&upload, offset, content[offset..end].to_vec()).await.unwrap() {
+            204 => offset = end,
+            refused => break refused,
+        }
+    };
+    assert_eq!(refused, 507);
+    assert!(offset > 1 << 20, "only {offset} bytes found room");
+    disk.resize("200m");
+    // A piece that was written before the row ran out of room counts; nothing that was promised is missing.
+    let there = app.upload_offset(&upload).await;
+    assert!(there >= offset, "{offset} bytes were promised, {there} are there");
+    assert_eq!(app.continue_upload(&upload, there, content[there..].to_vec()).await, Some(204));
+    let stored = app.get(&upload).await;
+    let id = stored["recording_id"].as_str().unwrap_or_else(|| panic!("{stored:#}"));
+    assert!(app.get_bytes(&format!("/v1/recordings/{id}/content")).await == content);
+}

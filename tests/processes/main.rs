@@ -3,6 +3,7 @@
 mod disk_full;
 mod kills;
 mod load;
+mod resumed;
 #[cfg(feature = "scaleout")]
 mod scaleout;
 #[cfg(feature = "scaleout")]

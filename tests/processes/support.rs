@@ -1,5 +1,6 @@
 //! The binary as a process, and a home app that does not give up.
 
+use base64::Engine;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
@@ -125,6 +126,32 @@ impl App {
         let response = request.body(recording).send().await.ok()?;
         let status = response.status().as_u16();
         Some((status, response.json().await.ok()?))
+    }
+
+    /// Address of a new resumable upload.
+    pub async fn begin_upload(&self, session: &str, length: usize, content_type: &str) -> String {
+        let request = self.http.post(format!("{}/v1/sessions/{session}/uploads", self.address)).bearer_auth(&self.key);
+        let said = format!("filetype {}", base64::engine::general_purpose::STANDARD.encode(content_type));
+        let request = request.header("tus-resumable", "1.0.0").header("upload-length", length);
+        let response = request.header("upload-metadata", said).send().await.expect("an answer");
+        assert_eq!(response.status().as_u16(), 201);
+        response.headers()["location"].to_str().expect("text").to_owned()
+    }
+
+    /// How much of an upload has arrived.
+    pub async fn upload_offset(&self, upload: &str) -> usize {
+        let request = self.http.head(format!("{}{upload}", self.address)).bearer_auth(&self.key);
+        let response = request.header("tus-resumable", "1.0.0").send().await.expect("an answer");
+        assert_eq!(response.status().as_u16(), 200);
+        response.headers()["upload-offset"].to_str().expect("text").parse().expect("a number")
+    }
+
+    /// One try to go on with an upload; the status, none when the service went away.
+    pub async fn continue_upload(&self, upload: &str, offset: usize, piece: Vec<u8>) -> Option<u16> {
+        let request = self.http.patch(format!("{}{upload}", self.address)).bearer_auth(&self.key);
+        let request = request.header("tus-resumable", "1.0.0").header("upload-offset", offset);
+        let request = request.header("content-type", "application/offset+octet-stream").body(piece);
+        request.send().await.ok().map(|response| response.status().as_u16())
     }
 
     /// Waits until no job is waiting or running.

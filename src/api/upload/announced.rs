@@ -6,6 +6,7 @@ use crate::recording::decode::Format;
 use axum::http::{HeaderMap, HeaderName};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use tus_protocol::UploadMetadata;
 
 const ACCEPTED: &str = "application/mcap, application/json or application/octet-stream";
 /// Content types of MCAP beside those that `Format` knows.
@@ -35,6 +36,21 @@ impl Announced {
         })
     }
 
+    /// What the metadata of a resumable upload say: `filetype`, `sha256`. Its name of the file is not looked at.
+    pub(super) fn from_metadata(metadata: &UploadMetadata, length: u64) -> Result<Self, ApiError> {
+        let text = |key: &'static str| -> Result<Option<&str>, ApiError> {
+            let Some(value) = metadata.get(key) else { return Ok(None) };
+            let text =
+                value.as_str().ok_or_else(|| ApiError::field("Upload-Metadata", format!("`{key}` must be text")));
+            // Browsers know no type of MCAP and say so by an empty one.
+            Ok(Some(text?.trim()).filter(|text| !text.is_empty()))
+        };
+        let format = text("filetype")?.map(|kind| format_of(&bare(kind))).transpose()?.flatten();
+        let sha256 =
+            text("sha256")?.map(|text| hexadecimal_of(text, "Upload-Metadata", "sha256 must be")).transpose()?;
+        Ok(Self { format, length: Some(length), sha256: sha256.into_iter().collect(), idempotency_key: None })
+    }
+
     /// Refuses bytes other than those that were announced.
     pub(super) fn check_digest(&self, found: &str) -> Result<(), ApiError> {
         match self.sha256.iter().find(|expected| *expected != found) {
@@ -45,11 +61,20 @@ impl Announced {
 }
 
 fn format(headers: &HeaderMap) -> Result<Option<Format>, ApiError> {
-    match media_type(headers).as_deref() {
-        None | Some(UNKNOWN) => Ok(None),
-        Some(VENDOR_MCAP) => Ok(Some(Format::Mcap)),
-        Some(name) => Format::from_content_type(name).map(Some).ok_or(ApiError::UnsupportedMediaType(ACCEPTED)),
+    media_type(headers).map_or(Ok(None), |name| format_of(&name))
+}
+
+fn format_of(media_type: &str) -> Result<Option<Format>, ApiError> {
+    match media_type {
+        UNKNOWN => Ok(None),
+        VENDOR_MCAP => Ok(Some(Format::Mcap)),
+        name => Format::from_content_type(name).map(Some).ok_or(ApiError::UnsupportedMediaType(ACCEPTED)),
     }
+}
+
+/// A content type without its parameters, lower case.
+fn bare(content_type: &str) -> String {
+    content_type.split(';').next().unwrap_or_default().trim().to_ascii_lowercase()
 }
 
 /// A header that may come once, as text.
@@ -84,10 +109,14 @@ fn digest(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
 
 fn hexadecimal(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
     let Some(text) = single(headers, "x-content-sha256")? else { return Ok(None) };
+    hexadecimal_of(text, "X-Content-SHA256", "must be").map(Some)
+}
+
+fn hexadecimal_of(text: &str, header: &str, must_be: &str) -> Result<String, ApiError> {
     if text.len() == 64 && text.bytes().all(|b| b.is_ascii_hexdigit()) {
-        return Ok(Some(text.to_ascii_lowercase()));
+        return Ok(text.to_ascii_lowercase());
     }
-    Err(ApiError::field("X-Content-SHA256", "must be 64 hexadecimal digits"))
+    Err(ApiError::field(header, format!("{must_be} 64 hexadecimal digits")))
 }
 
 fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {

@@ -20,9 +20,9 @@ use tokio::task::{JoinHandle, spawn_blocking};
 /// An upload of which nothing arrives for this long is given up.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Bytes that are handed to a blocking thread at once: enough to make the hop cheap.
-const BATCH_BYTES: usize = 256 << 10;
+pub(super) const BATCH_BYTES: usize = 256 << 10;
 /// Bytes that tell one format from another.
-const SNIFFED_BYTES: usize = 8;
+pub(super) const SNIFFED_BYTES: usize = 8;
 /// After a refusal this much more is read and dropped, so that a client which only listens once it has sent everything
 /// hears the reason and not a broken connection.
 const DRAINED_BYTES: usize = 4 << 20;
@@ -43,7 +43,7 @@ pub(super) async fn receive(state: &AppState, announced: &Announced, body: Body)
         // Nothing of it is read: a client that asked with `Expect: 100-continue` has not even begun to send.
         return Err(ApiError::TooLarge(limit));
     }
-    let mut chunks = Chunks { stream: body.into_data_stream(), received: 0, limit };
+    let mut chunks = Chunks::new(body, limit);
     let result = receive_chunks(state, announced, &mut chunks).await;
     if matches!(result, Err(ApiError::Recording(_) | ApiError::TooLarge(_))) {
         chunks.drain().await;
@@ -73,7 +73,8 @@ async fn receive_chunks(state: &AppState, announced: &Announced, chunks: &mut Ch
     Ok(Arrived { sealed: blob.seal().await?, inspection })
 }
 
-fn limit(state: &AppState, format: Option<Format>) -> u64 {
+/// Most bytes of a recording in this format.
+pub(super) fn limit(state: &AppState, format: Option<Format>) -> u64 {
     let config = &state.config;
     match format {
         Some(Format::Json) => config.max_json_recording_bytes.min(config.max_recording_bytes),
@@ -82,28 +83,35 @@ fn limit(state: &AppState, format: Option<Format>) -> u64 {
 }
 
 /// JSON is parsed as a whole, so only a few may be in memory at a time.
-async fn permit(state: &AppState, format: Format) -> Result<Option<OwnedSemaphorePermit>, ApiError> {
+pub(super) async fn permit(state: &AppState, format: Format) -> Result<Option<OwnedSemaphorePermit>, ApiError> {
     match format {
         Format::Mcap => Ok(None),
         Format::Json => state.json_uploads.clone().acquire_owned().await.map(Some).map_err(ApiError::internal),
     }
 }
 
-fn unknown_format() -> ApiError {
+/// Why bytes are no recording at all.
+pub(super) fn unknown_format() -> ApiError {
     let sentence = "the first bytes are neither those of MCAP nor of a JSON object; see the documentation of the \
                     recording format";
     ApiError::Recording(DecodeError::new("not_a_recording", sentence).at("byte 0"))
 }
 
 /// The chunks of a body, counted.
-struct Chunks {
+pub(super) struct Chunks {
     stream: BodyDataStream,
     received: u64,
     limit: u64,
 }
 
 impl Chunks {
-    async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
+    /// At most `limit` bytes of a body.
+    pub(super) fn new(body: Body, limit: u64) -> Self {
+        Self { stream: body.into_data_stream(), received: 0, limit }
+    }
+
+    /// The next bytes; none at the end.
+    pub(super) async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
         const STALLED: &str = "Nothing arrived for 30 seconds, so the upload was given up. Send it again.";
         let next = tokio::time::timeout(IDLE_TIMEOUT, self.stream.next());
         let chunk = match next.await.map_err(|_| ApiError::Timeout(STALLED))? {
@@ -116,7 +124,8 @@ impl Chunks {
         if self.received > self.limit { Err(ApiError::TooLarge(self.limit)) } else { Ok(Some(chunk)) }
     }
 
-    async fn drain(&mut self) {
+    /// Reads on for a moment, so that a client which only listens once it has sent everything hears why it was refused.
+    pub(super) async fn drain(&mut self) {
         let mut dropped = 0;
         let rest = async {
             while let Some(Ok(chunk)) = self.stream.next().await {

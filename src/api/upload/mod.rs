@@ -1,22 +1,24 @@
 //! Upload of a recording: streamed, checked while it arrives, stored whole or not at all.
 //!
 //! Nothing is a row before the last byte was seen: the bytes go to a part file that vanishes when anything is wrong
-//! with them or the client goes away.
+//! with them or the client goes away. [`resumable`] is for those who cannot send a recording in one go.
 
+mod admission;
 mod announced;
 mod arrival;
+pub mod resumable;
 
 use super::auth::Caller;
 use super::error::ApiError;
 use super::jobs::JobResponse;
-use super::noise_models::pinned;
 use super::recordings::RecordingResponse;
 use super::request::ApiPath;
 use super::sessions::SessionPath;
 use super::state::AppState;
-use crate::assessment::{JointAngleSettings, LegPoseSettings, Settings};
+use crate::assessment::Settings;
 use crate::queue::{Job, Submission};
 use crate::storage::{ConsentState, NewRecording, SessionId, StoredRecording, StoredResponse};
+use admission::{admit, suited_settings};
 use announced::Announced;
 use arrival::Arrived;
 use axum::body::Body;
@@ -34,7 +36,7 @@ const REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 
 /// Routes of this file. No time limit on the whole: an upload takes as long as its line is slow.
 pub fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(upload_recording))
+    OpenApiRouter::new().routes(routes!(upload_recording)).merge(resumable::router())
 }
 
 /// A stored recording and the job that assesses it.
@@ -81,11 +83,7 @@ async fn upload_recording(
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, ApiError> {
-    let session = state.store.session(&caller.access.own(), path.id).await?;
-    if state.config.require_consent {
-        state.store.require_consent(session.patient_id).await?;
-    }
-    state.queue.room(&caller.access).await?.map_err(ApiError::Crowded)?;
+    let session = admit(&state, &caller.access, path.id).await?;
     let announced = Announced::from_headers(&headers)?;
     let under_way = state.store.uploads().begin(session.patient_id);
     let arrived = tokio::select! {
@@ -95,18 +93,7 @@ async fn upload_recording(
     announced.check_digest(arrived.sealed.sha256())?;
 
     let fingerprint = fingerprint(session.id, &arrived);
-    let units = arrived.inspection.inertial_units.iter().map(|unit| unit.segment);
-    let suited = match arrived.inspection.depth {
-        Some(_) => Settings::LegPose(LegPoseSettings::default()),
-        None => Settings::suited_to(units),
-    };
-    let settings = match suited {
-        Settings::JointAngles(settings) => {
-            let settings = JointAngleSettings { noise_model: session.noise_model.clone(), ..settings };
-            Settings::JointAngles(pinned(&state, &caller.access, settings).await?)
-        }
-        other => other,
-    };
+    let settings = suited_settings(&state, &caller.access, &session, &arrived.inspection).await?;
     let blob = arrived.sealed.keep().await?;
     let new = NewRecording { session_id: session.id, blob, inspection: arrived.inspection };
     let submitted = submit(&state, &caller, &announced, fingerprint, &new, &settings).await;

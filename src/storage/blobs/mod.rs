@@ -192,7 +192,29 @@ impl BlobStore {
         listed.into_iter().map(key).collect::<object_store::Result<_>>().map_err(store_error("listing the blobs"))
     }
 
-    async fn keep(&self, part: &Part, blob: &StoredBlob) -> Result<(), StorageError> {
+    /// Makes a blob of a file that has all of `blob`'s bytes and is synced. The file stays: in a local folder the blob is a
+    /// second name of it, so it must not be written any more.
+    ///
+    /// # Errors
+    /// When the disk fails or is full.
+    pub async fn keep_file(&self, file: &Path, sha256: String, size_bytes: u64) -> Result<StoredBlob, StorageError> {
+        let blob = StoredBlob { key: key_of_digest(&sha256), sha256, size_bytes };
+        let part = Part { path: self.parts.join(Uuid::now_v7().to_string()) };
+        let source = match &self.folder {
+            None => file.to_owned(),
+            Some(_) => {
+                let (from, to) = (file.to_owned(), part.path.clone());
+                // The name among the parts is what a rename moves; where a file cannot have two names, it is a copy.
+                let naming = move || fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop));
+                in_background("naming a file as a part", naming).await?;
+                part.path.clone()
+            }
+        };
+        self.keep(&source, &blob).await?;
+        Ok(blob)
+    }
+
+    async fn keep(&self, part: &Path, blob: &StoredBlob) -> Result<(), StorageError> {
         let key = Key::from(blob.key.as_str());
         let there = match self.store.head(&key).await {
             Ok(found) => found.size == blob.size_bytes,
@@ -201,13 +223,13 @@ impl BlobStore {
         };
         match &self.folder {
             Some(folder) => {
-                let (part, target) = (part.path.clone(), folder.join(&blob.key));
+                let (part, target) = (part.to_owned(), folder.join(&blob.key));
                 in_background("moving a part to the blobs", move || rename_durably(&part, &target, there)).await
             }
             None if there => Ok(()),
             None => {
                 let copying = StorageError::blob;
-                let mut part = tokio::fs::File::open(&part.path).await.map_err(copying("reading a part file"))?;
+                let mut part = tokio::fs::File::open(part).await.map_err(copying("reading a part file"))?;
                 let mut upload = BufWriter::new(self.store.clone(), key);
                 match tokio::io::copy(&mut part, &mut upload).await {
                     Ok(_) => upload.shutdown().await.map_err(copying("storing a blob")),
@@ -355,7 +377,7 @@ impl SealedBlob {
     /// # Errors
     /// When the disk fails or is full.
     pub async fn keep(self) -> Result<StoredBlob, StorageError> {
-        self.store.keep(&self.part, &self.blob).await?;
+        self.store.keep(&self.part.path, &self.blob).await?;
         drop(self.lock);
         Ok(self.blob)
     }

@@ -122,3 +122,23 @@ async fn a_blob_that_was_changed_is_noticed_at_its_end() {
     let error = spawn_blocking(move || reader.read_to_end(&mut Vec::new()).unwrap_err()).await.unwrap();
     assert!(error.to_string().contains("not what was stored"), "{error}");
 }
+
+#[tokio::test]
+async fn a_file_becomes_a_blob_and_stays_under_its_own_name_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("upload");
+    fs::write(&file, b"abc").unwrap();
+    let sha256 = hex::encode(Sha256::digest(b"abc"));
+    let local = BlobStore::open(folder.path()).await.unwrap();
+    let remote = BlobStore::in_object_store(folder.path().join("elsewhere"), Arc::new(InMemory::new())).await.unwrap();
+    for store in [local, remote] {
+        // The second time is that of a process which died before it could say that the blob is stored.
+        for _ in 0..2 {
+            let blob = store.keep_file(&file, sha256.clone(), 3).await.unwrap();
+            assert_eq!(read_back(&store, &blob).await, b"abc");
+            assert_eq!(fs::read(&file).unwrap(), b"abc");
+        }
+    }
+    assert_eq!(entries(&folder.path().join(PART_FOLDER)), 0);
+    assert_eq!(entries(&folder.path().join("elsewhere")), 0);
+}

@@ -152,6 +152,9 @@ impl Store {
         let erasure = self.record(&mut transaction, order, &removed).await?;
         transaction.commit().await?;
         tracing::info!(erasure = %erasure.id, reason = order.reason.name(), "a patient was erased; remnants follow");
+        for upload in removed.uploads {
+            self.partial_files().remove(upload).await?;
+        }
         // Sessions are gone, so no upload can begin any more.
         if !self.uploads().stop_and_wait(order.patient, UPLOADS_END_WITHIN).await {
             tracing::warn!(erasure = %erasure.id, "an upload of an erased patient did not end in time; it will be refused");

@@ -3,7 +3,7 @@
 use super::ErasedBlob;
 use crate::assessment::Settings;
 use crate::storage::database::{Row, Transaction, query};
-use crate::storage::{JobId, OrganisationId, PatientId, RecordingId, StorageError, row};
+use crate::storage::{JobId, OrganisationId, PatientId, RecordingId, ResumableUploadId, StorageError, row};
 use std::collections::{BTreeMap, HashSet};
 
 /// What was removed.
@@ -15,6 +15,8 @@ pub(super) struct Removed {
     pub(super) blobs: Vec<ErasedBlob>,
     /// Jobs that are no more.
     pub(super) jobs: Vec<JobId>,
+    /// Uploads that may have a file.
+    pub(super) uploads: Vec<ResumableUploadId>,
 }
 
 /// A piece of SQL: the recordings of a patient.
@@ -32,8 +34,16 @@ macro_rules! assessments {
     };
 }
 
+/// A piece of SQL: the uploads that resume, or are over, of a patient.
+macro_rules! uploads {
+    () => {
+        "SELECT u.id FROM resumable_uploads u JOIN sessions s ON s.id = u.session_id WHERE s.patient_id = $1"
+    };
+}
+
 /// Everything that hangs on a patient: what refers to something comes before it.
-const TABLES: [(&str, &str); 13] = [
+const TABLES: [(&str, &str); 14] = [
+    ("resumable_uploads", concat!("DELETE FROM resumable_uploads WHERE id IN (", uploads!(), ")")),
     ("measures", "DELETE FROM measures WHERE patient_id = $1"),
     ("joint_tracks", concat!("DELETE FROM joint_tracks WHERE assessment_id IN (", assessments!(), ")")),
     ("time_chunks", concat!("DELETE FROM time_chunks WHERE assessment_id IN (", assessments!(), ")")),
@@ -60,6 +70,13 @@ pub(super) async fn remove(connection: &mut Transaction, patient: PatientId) -> 
             .bind(patient)
             .fetch_values(&mut *connection)
             .await?,
+        uploads: query(uploads!())
+            .bind(patient)
+            .fetch_values::<String>(&mut *connection)
+            .await?
+            .iter()
+            .filter_map(|id| id.parse().ok())
+            .collect(),
         ..Removed::default()
     };
     let models = remove_trainings(&mut *connection, organisation, patient, &mut removed.jobs).await?;

@@ -58,6 +58,12 @@ impl TestApp {
         app
     }
 
+    /// The same service on another state, such as one with a clock of the test's own.
+    pub fn use_state(&mut self, state: AppState) {
+        self.router = api::router(state.clone());
+        self.state = state;
+    }
+
     /// A new key in the organisation of `app.admin`.
     pub async fn key(&self, role: Role) -> String {
         let organisation = self.state.store.organisations().await.unwrap()[0].id;
@@ -66,7 +72,12 @@ impl TestApp {
 
     /// The admin key of another organisation.
     pub async fn stranger(&self) -> String {
-        let organisation = self.state.store.create_organisation("elsewhere").await.unwrap();
+        self.stranger_of("elsewhere").await
+    }
+
+    /// The admin key of another organisation of this name.
+    pub async fn stranger_of(&self, organisation: &str) -> String {
+        let organisation = self.state.store.create_organisation(organisation).await.unwrap();
         self.key_in(organisation.id, Role::Admin).await.1
     }
 
@@ -115,7 +126,12 @@ impl TestApp {
 
     /// Id of a new session of a new patient.
     pub async fn session(&self) -> String {
-        let patient = self.patient("P-1").await;
+        self.session_of("P-1").await
+    }
+
+    /// Id of a new session of a new patient of this pseudonym.
+    pub async fn session_of(&self, pseudonym: &str) -> String {
+        let patient = self.patient(pseudonym).await;
         let made = self.post("/v1/sessions").json(&json!({"patient_id": patient})).send().await;
         made.expect(StatusCode::CREATED)["id"].as_str().unwrap().to_owned()
     }
