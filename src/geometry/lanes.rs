@@ -11,6 +11,40 @@ use std::ops::{Add, AddAssign, Div, Mul, Sub};
 /// Numbers in a group: a multiple of every register's width (AVX-512 has 16 lanes, AVX 8, NEON 4).
 pub const LANES: usize = 16;
 
+/// Numbers of a group in memory, where a register of any width can be loaded in one piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+pub struct Group(pub [f32; LANES]);
+
+impl Default for Group {
+    fn default() -> Self {
+        Self([0.0; LANES])
+    }
+}
+
+impl Group {
+    /// The numbers of the lanes.
+    pub const NUMBERS: Self =
+        Self([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0]);
+
+    /// Registers that hold a group.
+    pub const fn registers<S: Simd>() -> usize {
+        LANES / S::F32_LANES
+    }
+
+    /// One register of the group.
+    #[inline(always)]
+    pub fn lanes<S: Simd>(&self, simd: S, register: usize) -> Lanes<S> {
+        Lanes::new(simd, S::as_simd_f32s(&self.0).0[register])
+    }
+
+    /// Stores one register of the group.
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, register: usize, lanes: Lanes<S>) {
+        S::as_mut_simd_f32s(&mut self.0).0[register] = lanes.values;
+    }
+}
+
 /// One register of numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Lanes<S: Simd> {
@@ -68,6 +102,12 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self::new(self.simd, self.simd.max_f32s(self.values, other.values))
+    }
+
+    /// The numbers where a condition holds, others where it does not.
+    #[inline(always)]
+    pub fn or_else(self, condition: S::m32s, others: Self) -> Self {
+        Self::new(self.simd, self.simd.select_f32s(condition, self.values, others.values))
     }
 
     /// The numbers whose bits these are.

@@ -12,8 +12,11 @@
 //!
 //! The first is the nearer root of the cone's quadratic in the form that does not cancel.
 
+use super::outline::Strip;
+use crate::geometry::lanes::Lanes;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
 use nalgebra::{Matrix3, Vector3};
+use pulp::Simd;
 
 /// Depth on one face.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -21,17 +24,6 @@ pub struct Face {
     c: f64,
     linear: Vector3<f64>,
     quadratic: Matrix3<f64>,
-}
-
-/// A face along a column: `z = c / (b0 + b1 k + √(e0 + e1 k + e2 k²))` at the k-th row from a first one.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FaceInColumn {
-    /// Numerator.
-    pub c: f32,
-    /// Linear part of the denominator.
-    pub b: [f32; 2],
-    /// Under the root.
-    pub e: [f32; 3],
 }
 
 impl Face {
@@ -55,40 +47,47 @@ impl Face {
         Some(Self { c, linear, quadratic })
     }
 
-    /// The numerator `c`.
+    /// The face in a register of a strip's columns.
     #[inline(always)]
-    pub fn constant_f32(&self) -> f32 {
-        self.c as f32
-    }
-
-    /// B.
-    #[inline(always)]
-    pub fn linear_f32(&self) -> [f32; 3] {
-        [self.linear.x as f32, self.linear.y as f32, self.linear.z as f32]
-    }
-
-    /// The upper triangle of M: xx, xy, xz; yy, yz, zz.
-    #[inline(always)]
-    pub fn quadratic_f32(&self) -> [[f32; 3]; 2] {
-        let m = &self.quadratic;
-        [[m[(0, 0)] as f32, m[(0, 1)] as f32, m[(0, 2)] as f32], [m[(1, 1)] as f32, m[(1, 2)] as f32, m[(2, 2)] as f32]]
-    }
-
-    /// The face in the column at x, from the row at y on, rows `pitch` apart (x, y and pitch at depth 1).
-    #[inline(always)]
-    pub fn in_column(&self, x: f64, y: f64, pitch: f64) -> FaceInColumn {
+    pub fn in_columns<S: Simd>(&self, simd: S, register: usize, strip: &Strip) -> FaceInColumns<S> {
+        let x = strip.x(simd, register);
         let (b, m) = (&self.linear, &self.quadratic);
-        let across = m[(0, 1)] * x + m[(1, 2)];
-        let constant = (m[(0, 0)] * x + 2.0 * m[(0, 2)]) * x + m[(2, 2)];
-        FaceInColumn {
-            c: self.c as f32,
-            b: [(b.x * x + b.y * y + b.z) as f32, (b.y * pitch) as f32],
-            e: [
-                (constant + (2.0 * across + m[(1, 1)] * y) * y) as f32,
-                (2.0 * (across + m[(1, 1)] * y) * pitch) as f32,
-                (m[(1, 1)] * pitch * pitch) as f32,
-            ],
+        let [bx, by, bz] = Lanes::splat_point(simd, &[b.x as f32, b.y as f32, b.z as f32]);
+        let [xx, yy, zz] = Lanes::splat_point(simd, &[m.m11 as f32, m.m22 as f32, m.m33 as f32]);
+        let [xy, xz, yz] = Lanes::splat_point(simd, &[m.m12 as f32, m.m13 as f32, m.m23 as f32]);
+        FaceInColumns {
+            c: Lanes::splat(simd, self.c as f32),
+            b: [x.mul_add(bx, bz), by],
+            e: [x.mul_add(x.mul_add(xx, xz + xz), zz), x.mul_add(xy + xy, yz + yz), yy],
+            y: strip.y(simd),
+            zero: Lanes::splat(simd, 0.0),
         }
+    }
+}
+
+/// Depth in a register of columns.
+pub trait DepthInColumns<S: Simd> {
+    /// Depth at a row of the image, metres.
+    fn depth(&self, row: Lanes<S>) -> Lanes<S>;
+}
+
+/// A face in a register of columns: `z = c / (b0 + b1 y + √(e0 + e1 y + e2 y²))`.
+#[derive(Debug, Clone, Copy)]
+pub struct FaceInColumns<S: Simd> {
+    c: Lanes<S>,
+    b: [Lanes<S>; 2],
+    e: [Lanes<S>; 3],
+    /// y of the first row and from row to row, at depth 1.
+    y: [Lanes<S>; 2],
+    zero: Lanes<S>,
+}
+
+impl<S: Simd> DepthInColumns<S> for FaceInColumns<S> {
+    #[inline(always)]
+    fn depth(&self, row: Lanes<S>) -> Lanes<S> {
+        let y = row.mul_add(self.y[1], self.y[0]);
+        let squared = y.mul_add(y.mul_add(self.e[2], self.e[1]), self.e[0]);
+        self.c / (y.mul_add(self.b[1], self.b[0]) + squared.max(self.zero).sqrt())
     }
 }
 

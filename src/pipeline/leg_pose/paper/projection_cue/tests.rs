@@ -14,7 +14,7 @@ impl WithSimd for Task<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<f64> {
-        ProjectionCue::new(self.0, &CAMERA).distance(simd, self.1, &mut Scratch::new(WIDTH))
+        ProjectionCue::new(self.0, &CAMERA).distance(simd, self.1, &mut Scratch::default())
     }
 }
 
