@@ -104,6 +104,14 @@ impl<S: Simd> Lanes<S> {
         Self::new(self.simd, self.simd.max_f32s(self.values, other.values))
     }
 
+    /// The largest whole number that is not above, for numbers from −2²¹ to 2²¹.
+    #[inline(always)]
+    pub fn floor(self) -> Self {
+        let nearest = self + SHIFT - SHIFT;
+        let is_above = self.simd.less_than_f32s(self.values, nearest.values);
+        (nearest - 1.0).or_else(is_above, nearest)
+    }
+
     /// The numbers where a condition holds, others where it does not.
     #[inline(always)]
     pub fn or_else(self, condition: S::m32s, others: Self) -> Self {
@@ -340,6 +348,7 @@ mod tests {
     function!(Logarithm, |x| [ln(x), x]);
     function!(Exponential, |x| [exp(x), x]);
     function!(Direction, |x| random_direction(x.simd, x.to_bits()).into());
+    function!(Floor, |x| [x.floor(), x]);
     function!(Uniform, |x| [random_uniform(x.simd, x.to_bits()), x]);
 
     #[test]
@@ -350,6 +359,15 @@ mod tests {
             let (exact_s, exact_c) = f64::from(*x).sin_cos();
             assert!((f64::from(*s) - exact_s).abs() < 2e-7, "sin {x}");
             assert!((f64::from(*c) - exact_c).abs() < 2e-7, "cos {x}");
+        }
+    }
+
+    #[test]
+    fn floors_are_those_of_the_library() {
+        let mut input: Vec<f32> = (-4000..4000).map(|k| k as f32 * 0.125).collect();
+        input.extend([-0.0, 1e-30, -1e-30, 0.999_999_94, 1_000_000.5, -1_000_000.5, 2_000_000.0, 479.999_97].repeat(2));
+        for (x, found) in input.iter().zip(&values_of(Floor, &input)[0]) {
+            assert_eq!(*found, x.floor(), "{x}");
         }
     }
 

@@ -138,14 +138,12 @@ fn regions<S: Simd>(
     order.sort_unstable_by(|a, b| middle(*a).total_cmp(&middle(*b)));
     let mut regions = [[0.0; BINS]; SOLID_COUNT];
     for number in first..last {
-        let strip = Strip::new(number, &view.intrinsics, sums.width);
+        let strip = Strip::new(number, &view.intrinsics, [sums.width, sums.height]);
         let rows = outlines.each_ref().map(|outline| outline.trace(simd, &strip).whole);
         for lane in 0..LANES.min(sums.width - number * LANES) {
             let mut free = Stretches::whole(sums.height);
             for solid in order {
-                let [low, high] = [rows[solid][0].0[lane], rows[solid][1].0[lane]];
-                // Conversions saturate, also at infinity.
-                let rows = [low.ceil() as usize, ((high.floor() + 1.0) as usize).min(sums.height)];
+                let rows = [rows[solid][0].0[lane] as usize, rows[solid][1].0[lane] as usize];
                 free.take(rows, |rows| sums.add(number * LANES + lane, rows, &mut regions[solid]));
             }
         }

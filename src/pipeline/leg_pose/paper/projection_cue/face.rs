@@ -12,7 +12,7 @@
 //!
 //! The first is the nearer root of the cone's quadratic in the form that does not cancel.
 
-use super::outline::Strip;
+use super::outline::{Span, Strip};
 use crate::geometry::lanes::Lanes;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
 use nalgebra::{Matrix3, Vector3};
@@ -24,11 +24,13 @@ pub struct Face {
     c: f64,
     linear: Vector3<f64>,
     quadratic: Matrix3<f64>,
+    /// Of the side: A = dᵀ (I − (1 + κ²) u uᵀ) d, which `(B·d)² − dᵀ M d = c A` holds for.
+    pub divisor: Matrix3<f64>,
 }
 
 impl Face {
     fn plane(normal: Vector3<f64>, point: &Vector3<f64>) -> Self {
-        Self { c: normal.dot(point), linear: normal, quadratic: Matrix3::zeros() }
+        Self { c: normal.dot(point), linear: normal, ..Self::default() }
     }
 
     fn side(solid: &TaperedCylinder, axis: &Vector3<f64>) -> Option<Self> {
@@ -42,27 +44,40 @@ impl Face {
             return None;
         }
         let linear = start - axis * (along - slope * radius_at_camera);
-        let quadratic =
-            linear * linear.transpose() - (Matrix3::identity() - axis * axis.transpose() * (1.0 + slope * slope)) * c;
-        Some(Self { c, linear, quadratic })
+        let divisor = Matrix3::identity() - axis * axis.transpose() * (1.0 + slope * slope);
+        let quadratic = linear * linear.transpose() - divisor * c;
+        Some(Self { c, linear, quadratic, divisor })
     }
 
     /// The face in a register of a strip's columns.
     #[inline(always)]
-    pub fn in_columns<S: Simd>(&self, simd: S, register: usize, strip: &Strip) -> FaceInColumns<S> {
+    pub fn in_columns<S: Simd>(&self, simd: S, register: usize, strip: &Strip, span: &Span) -> FaceInColumns<S> {
         let x = strip.x(simd, register);
-        let (b, m) = (&self.linear, &self.quadratic);
-        let [bx, by, bz] = Lanes::splat_point(simd, &[b.x as f32, b.y as f32, b.z as f32]);
-        let [xx, yy, zz] = Lanes::splat_point(simd, &[m.m11 as f32, m.m22 as f32, m.m33 as f32]);
-        let [xy, xz, yz] = Lanes::splat_point(simd, &[m.m12 as f32, m.m13 as f32, m.m23 as f32]);
+        let (b, [y, reach]) = (&self.linear, span.y);
+        let splat = |value: f64| Lanes::splat(simd, value as f32);
         FaceInColumns {
-            c: Lanes::splat(simd, self.c as f32),
-            b: [x.mul_add(bx, bz), by],
-            e: [x.mul_add(x.mul_add(xx, xz + xz), zz), x.mul_add(xy + xy, yz + yz), yy],
-            y: strip.y(simd),
-            zero: Lanes::splat(simd, 0.0),
+            constant: splat(self.c),
+            linear: [x.mul_add(splat(b.x), splat(b.y * y + b.z)), splat(b.y * reach)],
+            quadratic: quadratic_in_columns(simd, &self.quadratic, x, span),
+            span: span.lanes(simd),
+            zero: splat(0.0),
         }
     }
+}
+
+/// `dᵀ M d` for the rays of columns at x, by powers of a span's `t`, constant first.
+#[inline(always)]
+pub fn quadratic_in_columns<S: Simd>(simd: S, m: &Matrix3<f64>, x: Lanes<S>, span: &Span) -> [Lanes<S>; 3] {
+    let [y, reach] = span.y;
+    let [square, across, constant] = Lanes::splat_point(
+        simd,
+        &[m.m11 as f32, (2.0 * (m.m12 * y + m.m13)) as f32, ((m.m22 * y + 2.0 * m.m23) * y + m.m33) as f32],
+    );
+    let [mixed, first, second] = Lanes::splat_point(
+        simd,
+        &[(2.0 * m.m12 * reach) as f32, (2.0 * reach * (m.m22 * y + m.m23)) as f32, (m.m22 * reach * reach) as f32],
+    );
+    [x.mul_add(x.mul_add(square, across), constant), x.mul_add(mixed, first), second]
 }
 
 /// Depth in a register of columns.
@@ -71,23 +86,25 @@ pub trait DepthInColumns<S: Simd> {
     fn depth(&self, row: Lanes<S>) -> Lanes<S>;
 }
 
-/// A face in a register of columns: `z = c / (b0 + b1 y + √(e0 + e1 y + e2 y²))`.
+/// A face in a register of columns: `z = c / (b0 + b1 t + √(e0 + e1 t + e2 t²))`.
 #[derive(Debug, Clone, Copy)]
 pub struct FaceInColumns<S: Simd> {
-    c: Lanes<S>,
-    b: [Lanes<S>; 2],
-    e: [Lanes<S>; 3],
-    /// y of the first row and from row to row, at depth 1.
-    y: [Lanes<S>; 2],
+    constant: Lanes<S>,
+    /// b: B·d by powers of `t`.
+    pub linear: [Lanes<S>; 2],
+    /// e: dᵀ M d by powers of `t`.
+    pub quadratic: [Lanes<S>; 3],
+    span: [Lanes<S>; 2],
     zero: Lanes<S>,
 }
 
 impl<S: Simd> DepthInColumns<S> for FaceInColumns<S> {
     #[inline(always)]
     fn depth(&self, row: Lanes<S>) -> Lanes<S> {
-        let y = row.mul_add(self.y[1], self.y[0]);
-        let squared = y.mul_add(y.mul_add(self.e[2], self.e[1]), self.e[0]);
-        self.c / (y.mul_add(self.b[1], self.b[0]) + squared.max(self.zero).sqrt())
+        let t = row.mul_add(self.span[1], self.span[0]);
+        let [e0, e1, e2] = self.quadratic;
+        let squared = t.mul_add(t.mul_add(e2, e1), e0);
+        self.constant / (t.mul_add(self.linear[1], self.linear[0]) + squared.max(self.zero).sqrt())
     }
 }
 

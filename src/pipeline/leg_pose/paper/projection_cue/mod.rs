@@ -20,7 +20,7 @@
 pub mod face;
 pub mod outline;
 pub mod runs;
-pub mod smooth_side;
+pub mod side;
 
 use super::foreground::Foreground;
 use crate::body::legs::solids::SOLID_COUNT;
@@ -30,7 +30,7 @@ use crate::geometry::tapered_cylinder::TaperedCylinder;
 use face::Faces;
 use outline::{Outline, Strip};
 use pulp::Simd;
-use runs::Runs;
+use runs::{Runs, Scene};
 
 /// Scale of the likelihood, 1/m (λ2 = 1/3 per mm).
 pub const LAMBDA_PER_M: f64 = 1000.0 / 3.0;
@@ -81,14 +81,15 @@ impl<'a> ProjectionCue<'a> {
         let mut sums = Group::default();
         let runs = &mut scratch.runs;
         for number in first..last {
-            let strip = Strip::new(number, self.camera, width);
+            let strip = Strip::new(number, self.camera, [width, height]);
+            let scene = Scene { faces: &faces, strip: &strip, camera: self.camera };
             runs.clear();
             for (solid, outline) in outlines.iter().enumerate() {
                 if outline.strips().contains(&number) {
-                    runs.add_solid(simd, solid, &faces[solid], &strip, &outline.trace(simd, &strip), height);
+                    runs.add_solid(simd, &scene, solid, &outline.trace(simd, &strip));
                 }
             }
-            runs.sum(simd, &faces, &strip, self.foreground.strip(number), &mut sums);
+            runs.sum(simd, &scene, self.foreground.strip(number), &mut sums);
         }
         let mut sum = self.foreground.depth_sum;
         for lane in sums.0 {

@@ -14,8 +14,7 @@ use nalgebra::Vector3;
 use pulp::Simd;
 use std::ops::Range;
 
-/// Rows of the columns in a strip, from the first (at or after the first number) to the last (at or before the second);
-/// empty where they cross.
+/// Rows in the columns of a strip: from the first number to the one before the second; none where they do not ascend.
 pub type Rows = [Group; 2];
 
 /// Rows that a solid covers in a strip of columns.
@@ -36,15 +35,13 @@ pub struct Strip {
     x: Group,
     focal: f32,
     centre: f32,
-    /// y of the first row, and from row to row, at depth 1.
-    y: f32,
-    pitch: f32,
+    height: f32,
 }
 
 impl Strip {
-    /// The columns from `strip · LANES` on of images with so many.
+    /// The columns from `strip · LANES` on of images of a size.
     #[inline(always)]
-    pub fn new(strip: usize, camera: &Intrinsics, width: usize) -> Self {
+    pub fn new(strip: usize, camera: &Intrinsics, [width, height]: [usize; 2]) -> Self {
         let x = |lane: usize| {
             let column = strip * LANES + lane;
             if column < width { ((column as f64 - camera.cx) / camera.fx) as f32 } else { f32::NAN }
@@ -53,8 +50,7 @@ impl Strip {
             x: Group(std::array::from_fn(x)),
             focal: camera.fy as f32,
             centre: camera.cy as f32,
-            y: (-camera.cy / camera.fy) as f32,
-            pitch: (1.0 / camera.fy) as f32,
+            height: height as f32,
         }
     }
 
@@ -64,16 +60,43 @@ impl Strip {
         self.x.lanes(simd, register)
     }
 
-    /// y at depth 1 of the first row, and its step from row to row.
+    /// The whole rows of the image between two y at depth 1: the first, and the one after the last.
     #[inline(always)]
-    pub fn y<S: Simd>(&self, simd: S) -> [Lanes<S>; 2] {
-        [Lanes::splat(simd, self.y), Lanes::splat(simd, self.pitch)]
+    fn rows<S: Simd>(&self, simd: S, [low, high]: [Lanes<S>; 2]) -> [Lanes<S>; 2] {
+        let (focal, centre) = (Lanes::splat(simd, self.focal), Lanes::splat(simd, self.centre));
+        let (none, end) = (Lanes::splat(simd, -1.0), Lanes::splat(simd, self.height));
+        let before = low.mul_add(Lanes::splat(simd, 0.0) - focal, Lanes::splat(simd, 0.0) - centre);
+        let before = before.min(Lanes::splat(simd, 0.0)).max(none - self.height + 1.0);
+        let last = high.mul_add(focal, centre).max(none).min(end - 1.0);
+        [Lanes::splat(simd, 0.0) - before.floor(), last.floor() + 1.0]
+    }
+}
+
+/// Rows from one to another, with a coordinate `t` that goes from −1 to 1 over them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Span {
+    middle: f32,
+    reach: f32,
+    /// y at depth 1 in the middle, and from there to `t` = 1.
+    pub y: [f64; 2],
+}
+
+impl Span {
+    /// The rows from `low` to `high`, which is above it.
+    #[inline(always)]
+    pub fn new([low, high]: [u32; 2], camera: &Intrinsics) -> Self {
+        let (middle, reach) = (0.5 * f64::from(low + high), 0.5 * f64::from(high - low));
+        Self {
+            middle: middle as f32,
+            reach: reach as f32,
+            y: [(middle - camera.cy) / camera.fy, reach / camera.fy],
+        }
     }
 
-    /// The row at a y at depth 1.
+    /// `t` in the first row of the image, and its step from row to row.
     #[inline(always)]
-    fn row<S: Simd>(&self, simd: S, y: Lanes<S>) -> Lanes<S> {
-        y.mul_add(Lanes::splat(simd, self.focal), Lanes::splat(simd, self.centre))
+    pub fn lanes<S: Simd>(&self, simd: S) -> [Lanes<S>; 2] {
+        [Lanes::splat(simd, -self.middle / self.reach), Lanes::splat(simd, 1.0 / self.reach)]
     }
 }
 
@@ -211,11 +234,12 @@ impl Outline {
         let mut traced = Extents::default();
         for register in 0..Group::registers::<S>() {
             let [whole, disc, flat] = self.extents(simd, strip.x(simd, register));
-            for (rows, [low, high]) in
-                [(&mut traced.whole, whole), (&mut traced.disc, disc), (&mut traced.flat, flat)]
-            {
-                rows[0].set(register, strip.row(simd, low));
-                rows[1].set(register, strip.row(simd, high));
+            set_rows(&mut traced.whole, register, strip.rows(simd, whole));
+            if self.facing.is_some() {
+                set_rows(&mut traced.disc, register, strip.rows(simd, disc));
+            }
+            if self.shows_flat {
+                set_rows(&mut traced.flat, register, strip.rows(simd, flat));
             }
         }
         traced
@@ -286,6 +310,12 @@ impl Outline {
             Lanes::new(simd, simd.select_f32s(is_seen, a.max(b).values, none_high.values)),
         ]
     }
+}
+
+#[inline(always)]
+fn set_rows<S: Simd>(rows: &mut Rows, register: usize, lanes: [Lanes<S>; 2]) {
+    rows[0].set(register, lanes[0]);
+    rows[1].set(register, lanes[1]);
 }
 
 /// Widens an extent so that it holds another one.

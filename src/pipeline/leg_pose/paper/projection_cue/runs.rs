@@ -7,35 +7,40 @@
 //! With `s` the depth that is seen and `z ≥ 0` that of the model, `|z − s| − s = −min(2 s − z, z)`.
 
 use super::face::{DepthInColumns, FaceKind, Faces};
-use super::outline::{Extents, Rows, Strip};
-use super::smooth_side::SmoothSide;
+use super::outline::{Extents, Rows, Span, Strip};
+use super::side::Side;
 use crate::body::legs::solids::SOLID_COUNT;
+use crate::geometry::camera::Intrinsics;
 use crate::geometry::lanes::{Group, LANES, Lanes};
 use pulp::Simd;
 
-/// Most runs in a strip: of each solid the side before the other faces, between and behind them, the disc and the flat side.
-const MAX_RUNS: usize = 5 * SOLID_COUNT;
+/// Most runs in a strip: of each solid the disc, and the flat side and the side in what it leaves above and below.
+const MAX_RUNS: usize = 7 * SOLID_COUNT;
 
 /// Rows whose nearest depths are kept at a time.
 const BUFFERED: usize = 32;
 
-/// Rows of one face: in each column from `start` to the one before `end`.
+/// Rows of one face.
 #[derive(Debug, Clone, Copy, Default)]
 struct Run {
     rows: Rows,
     /// First row in any column, and the one after the last.
-    low: u32,
-    high: u32,
+    ends: [u32; 2],
     solid: u8,
     kind: FaceKind,
 }
 
-/// The runs of a strip, in the order of their first rows; used again for each strip.
+/// The runs of a strip; used again for each strip.
 #[derive(Debug, Clone)]
 pub struct Runs {
     runs: [Run; MAX_RUNS],
+    /// Numbers of the runs in the order of their first rows.
+    order: [u8; MAX_RUNS],
     count: usize,
-    sides: [Option<SmoothSide>; SOLID_COUNT],
+    sides: [Side; SOLID_COUNT],
+    /// What the sides are by; with a division where that is not true enough.
+    is_smooth: [bool; SOLID_COUNT],
+    spans: [Span; SOLID_COUNT],
     nearest: [Group; BUFFERED],
 }
 
@@ -43,11 +48,25 @@ impl Default for Runs {
     fn default() -> Self {
         Self {
             runs: [Run::default(); MAX_RUNS],
+            order: [0; MAX_RUNS],
             count: 0,
-            sides: [None; SOLID_COUNT],
+            sides: [Side::default(); SOLID_COUNT],
+            is_smooth: [false; SOLID_COUNT],
+            spans: [Span::default(); SOLID_COUNT],
             nearest: [Group::default(); BUFFERED],
         }
     }
+}
+
+/// The solids in a strip, as the camera sees them.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// Faces of each solid.
+    pub faces: &'a [Faces; SOLID_COUNT],
+    /// The columns.
+    pub strip: &'a Strip,
+    /// The camera.
+    pub camera: &'a Intrinsics,
 }
 
 impl Runs {
@@ -57,221 +76,201 @@ impl Runs {
         self.count = 0;
     }
 
-    /// Adds the runs of a solid: disc and flat side where they are, the side in what they leave. `height` is that of the image.
+    /// Adds the runs of a solid: disc and flat side where they are, the side in what they leave.
     #[inline(always)]
-    pub fn add_solid<S: Simd>(
-        &mut self,
-        simd: S,
-        solid: usize,
-        faces: &Faces,
-        strip: &Strip,
-        extents: &Extents,
-        height: usize,
-    ) {
-        let whole = whole_rows(&extents.whole, height);
-        let Some([low, high]) = ends(&whole) else { return };
+    pub fn add_solid<S: Simd>(&mut self, simd: S, scene: &Scene, solid: usize, extents: &Extents) {
+        let Scene { faces, strip, camera } = *scene;
+        let Some(ends) = ends(simd, &extents.whole) else { return };
+        let (span, faces) = (Span::new(ends, camera), &faces[solid]);
+        self.spans[solid] = span;
         if faces.shows_side {
-            self.sides[solid] = smooth_side(simd, faces, strip, &whole, height);
+            let side = faces.face(FaceKind::Side);
+            self.is_smooth[solid] = self.sides[solid].fit(simd, side, strip, &span, &extents.whole);
         }
-        if faces.disc.is_none() && !faces.shows_flat {
+        let [before, disc, after] = match faces.disc {
+            Some(_) => cut(simd, &extents.whole, &extents.disc),
+            None => [extents.whole, NO_ROWS, NO_ROWS],
+        };
+        self.add_run(simd, &disc, solid, FaceKind::Disc);
+        for part in [before, after] {
+            let [before, flat, after] = match faces.shows_flat {
+                true => cut(simd, &part, &extents.flat),
+                false => [part, NO_ROWS, NO_ROWS],
+            };
+            self.add_run(simd, &flat, solid, FaceKind::Flat);
             if faces.shows_side {
-                self.add_run(Run { rows: whole, low, high, solid: solid as u8, kind: FaceKind::Side });
-            }
-            return;
-        }
-        let (disc, flat) = (whole_rows(&extents.disc, height), whole_rows(&extents.flat, height));
-        let parts = split(&whole, &disc, &flat);
-        for (rows, kind) in parts.iter().zip(KINDS) {
-            if let Some([low, high]) = ends(rows)
-                && (faces.shows_side || kind != FaceKind::Side)
-            {
-                self.add_run(Run { rows: *rows, low, high, solid: solid as u8, kind });
+                self.add_run(simd, &before, solid, FaceKind::Side);
+                self.add_run(simd, &after, solid, FaceKind::Side);
             }
         }
     }
 
-    /// Adds a run in the order of first rows.
+    /// Adds a run, unless it has no rows, in the order of first rows.
     #[inline(always)]
-    fn add_run(&mut self, run: Run) {
+    fn add_run<S: Simd>(&mut self, simd: S, rows: &Rows, solid: usize, kind: FaceKind) {
+        let Some(ends) = ends(simd, rows) else { return };
         let mut place = self.count;
-        while place > 0 && self.runs[place - 1].low > run.low {
-            self.runs[place] = self.runs[place - 1];
+        while place > 0 && self.runs[self.order[place - 1] as usize].ends[0] > ends[0] {
+            self.order[place] = self.order[place - 1];
             place -= 1;
         }
-        self.runs[place] = run;
+        self.order[place] = self.count as u8;
+        self.runs[self.count] = Run { rows: *rows, ends, solid: solid as u8, kind };
         self.count += 1;
     }
 
     /// Takes `min(2 s − z, z)` of the covered pixels from the sums, one for each column of the strip.
     #[inline(always)]
-    pub fn sum<S: Simd>(
-        &mut self,
-        simd: S,
-        faces: &[Faces; SOLID_COUNT],
-        strip: &Strip,
-        twice_seen: &[Group],
-        sums: &mut Group,
-    ) {
-        let runs = &self.runs[..self.count];
+    pub fn sum<S: Simd>(&mut self, simd: S, scene: &Scene, twice_seen: &[Group], sums: &mut Group) {
         let (mut next, mut row) = (0, 0);
         let mut together = [0u8; MAX_RUNS];
         // From stretch to stretch of rows in which the same runs are.
-        while next < runs.len() {
-            row = row.max(runs[next].low);
+        while next < self.count {
+            row = row.max(self.run(next).ends[0]);
             let mut end = u32::MAX;
             let mut count = 0;
-            for (k, run) in runs.iter().enumerate().skip(next) {
-                if run.low > row {
-                    end = end.min(run.low);
+            for place in next..self.count {
+                let [low, high] = self.run(place).ends;
+                if low > row {
+                    end = end.min(low);
                     break;
                 }
-                if run.high > row {
-                    end = end.min(run.high);
-                    together[count] = k as u8;
+                if high > row {
+                    end = end.min(high);
+                    together[count] = self.order[place];
                     count += 1;
                 }
             }
-            if let [run] = together[..count] {
-                let run = &runs[run as usize];
-                let rows = [row, end];
-                match (run.kind, &self.sides[run.solid as usize]) {
-                    (FaceKind::Side, Some(side)) => {
-                        for register in 0..Group::registers::<S>() {
-                            let side = side.in_columns(simd, register);
-                            sum_one(simd, register, &side, run, rows, twice_seen, sums);
-                        }
+            match together[..count] {
+                [run] => self.sum_one(simd, scene, run, row, &twice_seen[row as usize..end as usize], sums),
+                _ => {
+                    let mut row = row;
+                    for seen in twice_seen[row as usize..end as usize].chunks(BUFFERED) {
+                        self.sum_nearest(simd, scene, &together[..count], row, seen, sums);
+                        row += BUFFERED as u32;
                     }
-                    (kind, _) => {
-                        let face = faces[run.solid as usize].face(kind);
-                        for register in 0..Group::registers::<S>() {
-                            let face = face.in_columns(simd, register, strip);
-                            sum_one(simd, register, &face, run, rows, twice_seen, sums);
-                        }
-                    }
-                }
-            } else {
-                let mut from = row;
-                while from < end {
-                    let to = end.min(from + BUFFERED as u32);
-                    let nearest = &mut self.nearest[..(to - from) as usize];
-                    nearest.fill(Group([f32::INFINITY; LANES]));
-                    for run in &together[..count] {
-                        let run = &runs[*run as usize];
-                        match (run.kind, &self.sides[run.solid as usize]) {
-                            (FaceKind::Side, Some(side)) => {
-                                for register in 0..Group::registers::<S>() {
-                                    let side = side.in_columns(simd, register);
-                                    take_nearer(simd, register, &side, run, from, nearest);
-                                }
-                            }
-                            (kind, _) => {
-                                let face = faces[run.solid as usize].face(kind);
-                                for register in 0..Group::registers::<S>() {
-                                    let face = face.in_columns(simd, register, strip);
-                                    take_nearer(simd, register, &face, run, from, nearest);
-                                }
-                            }
-                        }
-                    }
-                    sum_nearest(simd, nearest, &twice_seen[from as usize..to as usize], sums);
-                    from = to;
                 }
             }
             row = end;
-            while next < runs.len() && runs[next].high <= row {
+            while next < self.count && self.run(next).ends[1] <= row {
                 next += 1;
             }
         }
     }
-}
 
-/// What the parts of [`split`] are.
-const KINDS: [FaceKind; 5] = [FaceKind::Side, FaceKind::Side, FaceKind::Side, FaceKind::Disc, FaceKind::Flat];
-
-/// Whole rows of an extent inside an image: the first, and the one after the last.
-#[inline(always)]
-fn whole_rows(rows: &Rows, height: usize) -> Rows {
-    let height = height as f32;
-    let mut whole = Rows::default();
-    for lane in 0..LANES {
-        whole[0].0[lane] = rows[0].0[lane].ceil().max(0.0).min(height);
-        whole[1].0[lane] = (rows[1].0[lane].floor() + 1.0).max(0.0).min(height);
+    /// The run with the so-many-th first row.
+    #[inline(always)]
+    fn run(&self, place: usize) -> &Run {
+        &self.runs[self.order[place] as usize]
     }
-    whole
+
+    /// Adds the rows from one on, which one run covers.
+    #[inline(always)]
+    fn sum_one<S: Simd>(&self, simd: S, scene: &Scene, run: u8, row: u32, twice_seen: &[Group], sums: &mut Group) {
+        let run = &self.runs[run as usize];
+        let solid = run.solid as usize;
+        for register in 0..Group::registers::<S>() {
+            if run.kind == FaceKind::Side && self.is_smooth[solid] {
+                let side = self.sides[solid].in_columns(simd, register);
+                add_rows(simd, register, &side, run, row, twice_seen, sums);
+            } else {
+                let face = scene.faces[solid].face(run.kind);
+                let face = face.in_columns(simd, register, scene.strip, &self.spans[solid]);
+                add_rows(simd, register, &face, run, row, twice_seen, sums);
+            }
+        }
+    }
+
+    /// Adds the rows from one on, at most [`BUFFERED`], which several runs cover: the nearest counts.
+    #[inline(always)]
+    fn sum_nearest<S: Simd>(
+        &mut self,
+        simd: S,
+        scene: &Scene,
+        runs: &[u8],
+        row: u32,
+        twice_seen: &[Group],
+        sums: &mut Group,
+    ) {
+        let Self { runs: all, sides, is_smooth, spans, nearest, .. } = self;
+        let nearest = &mut nearest[..twice_seen.len()];
+        for (k, run) in runs.iter().enumerate() {
+            let run = &all[*run as usize];
+            let solid = run.solid as usize;
+            for register in 0..Group::registers::<S>() {
+                if run.kind == FaceKind::Side && is_smooth[solid] {
+                    let side = sides[solid].in_columns(simd, register);
+                    take_nearer(simd, register, &side, run, row, k == 0, nearest);
+                } else {
+                    let face = scene.faces[solid].face(run.kind);
+                    let face = face.in_columns(simd, register, scene.strip, &spans[solid]);
+                    take_nearer(simd, register, &face, run, row, k == 0, nearest);
+                }
+            }
+        }
+        let (zero, infinity) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, f32::INFINITY));
+        for register in 0..Group::registers::<S>() {
+            let mut total = sums.lanes(simd, register);
+            for (nearest, seen) in nearest.iter().zip(twice_seen) {
+                let z = nearest.lanes(simd, register);
+                let z = z.or_else(simd.less_than_f32s(z.values, infinity.values), zero);
+                total = total - (seen.lanes(simd, register) - z).min(z);
+            }
+            sums.set(register, total);
+        }
+    }
 }
+
+const NO_ROWS: Rows = [Group([0.0; LANES]); 2];
 
 /// First row in any column and the one after the last; `None` when there is no row.
 #[inline(always)]
-fn ends(rows: &Rows) -> Option<[u32; 2]> {
+fn ends<S: Simd>(simd: S, rows: &Rows) -> Option<[u32; 2]> {
     let (mut low, mut high) = (f32::INFINITY, 0.0f32);
-    for lane in 0..LANES {
-        let (start, end) = (rows[0].0[lane], rows[1].0[lane]);
-        let is_empty = start >= end;
-        low = low.min(if is_empty { f32::INFINITY } else { start });
-        high = high.max(if is_empty { 0.0 } else { end });
+    let (zero, infinity) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, f32::INFINITY));
+    for register in 0..Group::registers::<S>() {
+        let (start, end) = (rows[0].lanes(simd, register), rows[1].lanes(simd, register));
+        let has_rows = simd.less_than_f32s(start.values, end.values);
+        low = low.min(simd.reduce_min_f32s(start.or_else(has_rows, infinity).values));
+        high = high.max(simd.reduce_max_f32s(end.or_else(has_rows, zero).values));
     }
     (low < high).then_some([low as u32, high as u32])
 }
 
-/// Side before, between and after the other two, disc, flat side.
+/// Rows before others, those that both have, and those after them; all of them after, where none are in both.
 #[inline(always)]
-fn split(whole: &Rows, disc: &Rows, flat: &Rows) -> [Rows; 5] {
-    let mut parts = [Rows::default(); 5];
-    for lane in 0..LANES {
-        let (start, end) = (whole[0].0[lane], whole[1].0[lane]);
-        let disc_is_first = disc[0].0[lane] <= flat[0].0[lane];
-        let (first, second) = if disc_is_first { (disc, flat) } else { (flat, disc) };
-        let first = within([first[0].0[lane], first[1].0[lane]], [start, end]);
-        let second = within([second[0].0[lane], second[1].0[lane]], [first[1], end]);
-        let (disc, flat) = if disc_is_first { (first, second) } else { (second, first) };
-        let rows = [[start, first[0]], [first[1], second[0]], [second[1], end], disc, flat];
-        for (part, rows) in parts.iter_mut().zip(rows) {
-            [part[0].0[lane], part[1].0[lane]] = rows;
-        }
-    }
-    parts
-}
-
-/// Rows inside others; where there are none, none at the start of the others.
-#[inline(always)]
-fn within(rows: [f32; 2], [start, end]: [f32; 2]) -> [f32; 2] {
-    let (from, to) = (rows[0].max(start), rows[1].min(end));
-    if from < to { [from, to] } else { [start; 2] }
-}
-
-/// The polynomials of a solid's side, when they are true in all the columns that it covers.
-#[inline(always)]
-fn smooth_side<S: Simd>(simd: S, faces: &Faces, strip: &Strip, whole: &Rows, height: usize) -> Option<SmoothSide> {
-    let mut side = SmoothSide::default();
-    let last = Lanes::splat(simd, height as f32 - 1.0);
+fn cut<S: Simd>(simd: S, rows: &Rows, by: &Rows) -> [Rows; 3] {
+    let [mut before, mut inside, mut after] = [*rows; 3];
     for register in 0..Group::registers::<S>() {
-        let face = faces.face(FaceKind::Side).in_columns(simd, register, strip);
-        let rows = [whole[0].lanes(simd, register), (whole[1].lanes(simd, register) - 1.0).min(last)];
-        side.fit(simd, register, &face, &rows);
+        let start = rows[0].lanes(simd, register);
+        let from = by[0].lanes(simd, register).max(start);
+        let to = by[1].lanes(simd, register).min(rows[1].lanes(simd, register));
+        let are_in_both = simd.less_than_f32s(from.values, to.values);
+        let (from, to) = (from.or_else(are_in_both, start), to.or_else(are_in_both, start));
+        before[1].set(register, from);
+        inside[0].set(register, from);
+        inside[1].set(register, to);
+        after[0].set(register, to);
     }
-    let mut untrue = 0;
-    for lane in 0..LANES {
-        untrue += u32::from(whole[0].0[lane] < whole[1].0[lane] && side.pitch.0[lane] == 0.0);
-    }
-    (untrue == 0).then_some(side)
+    [before, inside, after]
 }
 
-/// Takes the rows of a stretch that one run covers from the sums.
+/// Adds rows that one run covers.
 #[inline(always)]
-fn sum_one<S: Simd>(
+fn add_rows<S: Simd>(
     simd: S,
     register: usize,
     face: &impl DepthInColumns<S>,
     run: &Run,
-    [from, to]: [u32; 2],
+    first: u32,
     twice_seen: &[Group],
     sums: &mut Group,
 ) {
     let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
     let (start, end) = (run.rows[0].lanes(simd, register), run.rows[1].lanes(simd, register));
     let mut total = sums.lanes(simd, register);
-    let mut row = Lanes::splat(simd, from as f32);
-    for seen in &twice_seen[from as usize..to as usize] {
+    let mut row = Lanes::splat(simd, first as f32);
+    for seen in twice_seen {
         let z = face.depth(row).or_else(is_within(simd, row, start, end), zero);
         total = total - (seen.lanes(simd, register) - z).min(z);
         row += one;
@@ -279,38 +278,31 @@ fn sum_one<S: Simd>(
     sums.set(register, total);
 }
 
-/// Keeps the nearer of some depths and those of a run, from a row on.
+/// Keeps the nearer of some depths, when there are some, and those of a run.
 #[inline(always)]
 fn take_nearer<S: Simd>(
     simd: S,
     register: usize,
     face: &impl DepthInColumns<S>,
     run: &Run,
-    from: u32,
+    first: u32,
+    is_first: bool,
     nearest: &mut [Group],
 ) {
     let (infinity, one) = (Lanes::splat(simd, f32::INFINITY), Lanes::splat(simd, 1.0));
     let (start, end) = (run.rows[0].lanes(simd, register), run.rows[1].lanes(simd, register));
-    let mut row = Lanes::splat(simd, from as f32);
+    let mut row = Lanes::splat(simd, first as f32);
+    if is_first {
+        for nearest in nearest {
+            nearest.set(register, face.depth(row).or_else(is_within(simd, row, start, end), infinity));
+            row += one;
+        }
+        return;
+    }
     for nearest in nearest {
         let z = face.depth(row).or_else(is_within(simd, row, start, end), infinity);
         nearest.set(register, nearest.lanes(simd, register).min(z));
         row += one;
-    }
-}
-
-/// Takes the rows with these depths, infinite where nothing is, from the sums.
-#[inline(always)]
-fn sum_nearest<S: Simd>(simd: S, nearest: &[Group], twice_seen: &[Group], sums: &mut Group) {
-    let (zero, infinity) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, f32::INFINITY));
-    for register in 0..Group::registers::<S>() {
-        let mut total = sums.lanes(simd, register);
-        for (nearest, seen) in nearest.iter().zip(twice_seen) {
-            let z = nearest.lanes(simd, register);
-            let z = z.or_else(simd.less_than_f32s(z.values, infinity.values), zero);
-            total = total - (seen.lanes(simd, register) - z).min(z);
-        }
-        sums.set(register, total);
     }
 }
 
