@@ -204,10 +204,12 @@ impl ParticleModel for LegParticleModel {
 
     fn log_likelihood(&mut self, observation: &Observation, _: &Particles, log_likelihood: &mut [f32]) {
         let (cues, power, arch) = (self.cues, self.likelihood_power, self.arch);
-        log_likelihood.par_chunks_mut(CHUNK).zip(self.bodies.par_chunks(CHUNK)).for_each_init(
-            Scratch::default,
-            |scratch, (out, bodies)| arch.dispatch(WeighTask { observation, cues, power, bodies, scratch, out }),
-        );
+        log_likelihood
+            .par_chunks_mut(CHUNK)
+            .zip(self.bodies.par_chunks(CHUNK))
+            .for_each_init(Scratch::default, |scratch, (out, bodies)| {
+                arch.dispatch(WeighTask { observation, cues, power, bodies, scratch, out })
+            });
     }
 }
 

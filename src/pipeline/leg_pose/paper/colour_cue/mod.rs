@@ -86,11 +86,7 @@ impl ColourCue {
     /// Mean L1 distance of both histograms over segments and cameras, 0 to 4. `None` when a part of the model is behind a
     /// camera.
     #[inline(always)]
-    pub fn distance<S: Simd>(
-        &self,
-        simd: S,
-        solids: &[TaperedCylinder; SOLID_COUNT],
-    ) -> Option<f64> {
+    pub fn distance<S: Simd>(&self, simd: S, solids: &[TaperedCylinder; SOLID_COUNT]) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0u32);
         for (template, sums) in self.templates.views.iter().zip(&self.sums) {
             let regions = regions(simd, solids, template, sums)?;

@@ -86,11 +86,7 @@ impl Span {
     #[inline(always)]
     pub fn new([low, high]: [u32; 2], camera: &Intrinsics) -> Self {
         let (middle, reach) = (0.5 * f64::from(low + high), 0.5 * f64::from(high - low));
-        Self {
-            middle: middle as f32,
-            reach: reach as f32,
-            y: [(middle - camera.cy) / camera.fy, reach / camera.fy],
-        }
+        Self { middle: middle as f32, reach: reach as f32, y: [(middle - camera.cy) / camera.fy, reach / camera.fy] }
     }
 
     /// `t` in the first row of the image, and its step from row to row.

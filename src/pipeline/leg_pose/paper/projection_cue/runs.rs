@@ -308,8 +308,5 @@ fn take_nearer<S: Simd>(
 
 #[inline(always)]
 fn is_within<S: Simd>(simd: S, row: Lanes<S>, start: Lanes<S>, end: Lanes<S>) -> S::m32s {
-    simd.and_m32s(
-        simd.less_than_or_equal_f32s(start.values, row.values),
-        simd.less_than_f32s(row.values, end.values),
-    )
+    simd.and_m32s(simd.less_than_or_equal_f32s(start.values, row.values), simd.less_than_f32s(row.values, end.values))
 }
