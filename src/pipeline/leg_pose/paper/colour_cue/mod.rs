@@ -15,7 +15,8 @@ pub mod histogram;
 
 use super::projection_cue::face::Faces;
 use super::projection_cue::is_in_front;
-use super::projection_cue::outline::{Outline, Strip};
+use super::projection_cue::outline::Outline;
+use super::projection_cue::strip::Strip;
 use crate::body::legs::solids::SOLID_COUNT;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::lanes::LANES;

@@ -12,7 +12,7 @@
 //!
 //! The first is the nearer root of the cone's quadratic in the form that does not cancel.
 
-use super::outline::{Span, Strip};
+use super::strip::{Span, Strip};
 use crate::geometry::lanes::Lanes;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
 use nalgebra::{Matrix3, Vector3};

@@ -12,15 +12,16 @@
 //! ```
 //!
 //! The solids are convex, so each covers one interval of rows in a column, and its front consists of few smooth
-//! [`faces`](face) on which depth along a column has a closed form. The ends of the intervals are found for many columns
-//! at once ([`outline`]), and so are polynomials for the depth of the sides ([`smooth_side`]); in each column they are sorted, and where solids overlap the nearer depth is taken. There is
-//! no depth buffer. The paper rasterises polygons that circumscribe the cylinders; here the surfaces are exact, and solids
+//! [`faces`](face) on which depth along a column has a closed form. Sixteen columns, a [`strip`], are gone through together: the
+//! ends of the intervals are found in all of them at once ([`outline`]), faces are sorted by their first rows ([`runs`]), and
+//! where several are in a row the nearer depth is taken. There is no depth buffer of the image. The paper rasterises polygons that circumscribe the cylinders; here the surfaces are exact, and solids
 //! are closed by discs at their ends.
 
 pub mod face;
 pub mod outline;
 pub mod runs;
 pub mod side;
+pub mod strip;
 
 use super::foreground::Foreground;
 use crate::body::legs::solids::SOLID_COUNT;
@@ -28,9 +29,10 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::lanes::Group;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
 use face::Faces;
-use outline::{Outline, Strip};
+use outline::Outline;
 use pulp::Simd;
 use runs::{Runs, Scene};
+use strip::Strip;
 
 /// Scale of the likelihood, 1/m (λ2 = 1/3 per mm).
 pub const LAMBDA_PER_M: f64 = 1000.0 / 3.0;

@@ -7,8 +7,9 @@
 //! With `s` the depth that is seen and `z ≥ 0` that of the model, `|z − s| − s = −min(2 s − z, z)`.
 
 use super::face::{DepthInColumns, FaceKind, Faces};
-use super::outline::{Extents, Rows, Span, Strip};
+use super::outline::Extents;
 use super::side::Side;
+use super::strip::{Rows, Span, Strip};
 use crate::body::legs::solids::SOLID_COUNT;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::lanes::{Group, LANES, Lanes};
@@ -38,7 +39,7 @@ pub struct Runs {
     order: [u8; MAX_RUNS],
     count: usize,
     sides: [Side; SOLID_COUNT],
-    /// What the sides are by; with a division where that is not true enough.
+    /// Where `sides` is true enough; elsewhere the face itself is used, with a division.
     is_smooth: [bool; SOLID_COUNT],
     spans: [Span; SOLID_COUNT],
     nearest: [Group; BUFFERED],

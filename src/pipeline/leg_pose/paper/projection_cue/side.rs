@@ -12,7 +12,7 @@
 //! itself is used.
 
 use super::face::{DepthInColumns, Face, quadratic_in_columns};
-use super::outline::{Rows, Span, Strip};
+use super::strip::{Rows, Span, Strip};
 use crate::geometry::lanes::{Group, LANES, Lanes};
 use pulp::Simd;
 
