@@ -11,6 +11,40 @@ use std::ops::{Add, AddAssign, Div, Mul, Sub};
 /// Numbers in a group: a multiple of every register's width (AVX-512 has 16 lanes, AVX 8, NEON 4).
 pub const LANES: usize = 16;
 
+/// Numbers of a group in memory, where a register of any width can be loaded in one piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+pub struct Group(pub [f32; LANES]);
+
+impl Default for Group {
+    fn default() -> Self {
+        Self([0.0; LANES])
+    }
+}
+
+impl Group {
+    /// The numbers of the lanes.
+    pub const NUMBERS: Self =
+        Self([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0]);
+
+    /// Registers that hold a group.
+    pub const fn registers<S: Simd>() -> usize {
+        LANES / S::F32_LANES
+    }
+
+    /// One register of the group.
+    #[inline(always)]
+    pub fn lanes<S: Simd>(&self, simd: S, register: usize) -> Lanes<S> {
+        Lanes::new(simd, S::as_simd_f32s(&self.0).0[register])
+    }
+
+    /// Stores one register of the group.
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, register: usize, lanes: Lanes<S>) {
+        S::as_mut_simd_f32s(&mut self.0).0[register] = lanes.values;
+    }
+}
+
 /// One register of numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Lanes<S: Simd> {
@@ -68,6 +102,20 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self::new(self.simd, self.simd.max_f32s(self.values, other.values))
+    }
+
+    /// The largest whole number that is not above, for numbers from −2²¹ to 2²¹.
+    #[inline(always)]
+    pub fn floor(self) -> Self {
+        let nearest = self + SHIFT - SHIFT;
+        let is_above = self.simd.less_than_f32s(self.values, nearest.values);
+        (nearest - 1.0).or_else(is_above, nearest)
+    }
+
+    /// The numbers where a condition holds, others where it does not.
+    #[inline(always)]
+    pub fn or_else(self, condition: S::m32s, others: Self) -> Self {
+        Self::new(self.simd, self.simd.select_f32s(condition, self.values, others.values))
     }
 
     /// The numbers whose bits these are.
@@ -300,6 +348,7 @@ mod tests {
     function!(Logarithm, |x| [ln(x), x]);
     function!(Exponential, |x| [exp(x), x]);
     function!(Direction, |x| random_direction(x.simd, x.to_bits()).into());
+    function!(Floor, |x| [x.floor(), x]);
     function!(Uniform, |x| [random_uniform(x.simd, x.to_bits()), x]);
 
     #[test]
@@ -310,6 +359,15 @@ mod tests {
             let (exact_s, exact_c) = f64::from(*x).sin_cos();
             assert!((f64::from(*s) - exact_s).abs() < 2e-7, "sin {x}");
             assert!((f64::from(*c) - exact_c).abs() < 2e-7, "cos {x}");
+        }
+    }
+
+    #[test]
+    fn floors_are_those_of_the_library() {
+        let mut input: Vec<f32> = (-4000..4000).map(|k| k as f32 * 0.125).collect();
+        input.extend([-0.0, 1e-30, -1e-30, 0.999_999_94, 1_000_000.5, -1_000_000.5, 2_000_000.0, 479.999_97].repeat(2));
+        for (x, found) in input.iter().zip(&values_of(Floor, &input)[0]) {
+            assert_eq!(*found, x.floor(), "{x}");
         }
     }
 

@@ -9,7 +9,7 @@
 //! values. Where the background saw nothing, whatever the image sees is foreground, as with raw values.
 
 use crate::geometry::camera::{DepthMap, Intrinsics};
-use crate::geometry::lanes::LANES;
+use crate::geometry::lanes::{Group, LANES};
 use crate::pipeline::leg_pose::foreground::Region;
 
 /// Inverse depth per raw step of a Kinect v1, 1/m (\[walker\] Eq. 1).
@@ -18,17 +18,17 @@ const INVERSE_DEPTH_STEP: f32 = 0.00307;
 /// Cue 1 uses one foreground point of so many (\[walker\], section 4.4.1: 10 %).
 pub const SAMPLING: usize = 10;
 
-/// A prepared frame. Columns of the image are contiguous, because both the projections of upright legs and the loops
-/// over them run along columns.
+/// A prepared frame. It lies in strips of [`LANES`] columns, because the projections of upright legs run along columns and
+/// a register holds one row of a strip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Foreground {
     /// Pixels in a row.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Column by column: depth of the foreground, metres, 0 elsewhere; each column ends with [`LANES`] more zeros, so that
-    /// a register can be loaded at every row.
-    pub columns: Vec<f32>,
+    /// Strip by strip, row by row: twice the depth of the foreground, metres, 0 elsewhere. Twice, because that is what
+    /// cue 2 compares with ([`projection_cue`](super::projection_cue)).
+    twice_depth: Vec<Group>,
     /// Pixels of the foreground.
     pub pixels: usize,
     /// Sum of the foreground's depths, metres.
@@ -56,10 +56,9 @@ impl Foreground {
         assert!(image.depth.len() == width * height && background.depth.len() == width * height, "whole images");
         let threshold = threshold_steps as f32 * INVERSE_DEPTH_STEP;
         let [near, far] = region.depth.map(|z| z as f32);
-        let stride = height + LANES;
-        let mut columns = vec![0.0; width * stride];
+        let mut strips = vec![Group::default(); width.div_ceil(LANES) * height];
         let mut seen = 0usize;
-        // Row by row, as the images lie in memory; the columns are few enough to stay in the cache.
+        // Row by row, as the images lie in memory; the strips are few enough to stay in the cache.
         for j in 0..height {
             let rows = j * width..(j + 1) * width;
             for (i, (z, floor)) in image.depth[rows.clone()].iter().zip(&background.depth[rows]).enumerate() {
@@ -69,14 +68,14 @@ impl Foreground {
                 let steps = (1.0 / z - 1.0 / floor).abs();
                 let differs = steps >= threshold || steps.is_nan();
                 if is_seen && differs && *z >= near && *z <= far {
-                    columns[i * stride + j] = *z;
+                    strips[i / LANES * height + j].0[i % LANES] = 2.0 * *z;
                 }
             }
         }
         let mut foreground = Self {
             width,
             height,
-            columns,
+            twice_depth: strips,
             pixels: 0,
             depth_sum: 0.0,
             points: Vec::new(),
@@ -88,21 +87,23 @@ impl Foreground {
 
     /// Applies the bounds on x, counts, sums and samples.
     fn collect(&mut self, camera: &Intrinsics, region: &Region) {
-        let stride = self.stride();
-        for (i, column) in self.columns.chunks_exact_mut(stride).enumerate() {
+        for i in 0..self.width {
             let slope = (i as f64 - camera.cx) / camera.fx;
-            for (j, z) in column[..self.height].iter_mut().enumerate() {
-                if *z == 0.0 {
+            let strip = &mut self.twice_depth[i / LANES * self.height..][..self.height];
+            for (j, row) in strip.iter_mut().enumerate() {
+                let twice = &mut row.0[i % LANES];
+                if *twice == 0.0 {
                     continue;
                 }
-                let depth = f64::from(*z);
+                let z = 0.5 * *twice;
+                let depth = f64::from(z);
                 if !(region.x[0]..=region.x[1]).contains(&(slope * depth)) {
-                    *z = 0.0;
+                    *twice = 0.0;
                     continue;
                 }
                 if self.pixels.is_multiple_of(SAMPLING) {
                     let y = (j as f64 - camera.cy) / camera.fy * depth;
-                    self.points.push([(slope * depth) as f32, y as f32, *z]);
+                    self.points.push([(slope * depth) as f32, y as f32, z]);
                 }
                 self.pixels += 1;
                 self.depth_sum += depth;
@@ -110,14 +111,15 @@ impl Foreground {
         }
     }
 
-    /// Numbers from one column to the next.
-    pub fn stride(&self) -> usize {
-        self.height + LANES
+    /// Twice the depths of a strip: the [`LANES`] columns from `strip · LANES` on, row by row.
+    #[inline(always)]
+    pub fn strip(&self, strip: usize) -> &[Group] {
+        &self.twice_depth[strip * self.height..][..self.height]
     }
 
     /// Depth of the foreground at a pixel, metres; 0 where there is none.
     pub fn depth(&self, i: usize, j: usize) -> f32 {
-        self.columns[i * self.stride() + j]
+        0.5 * self.strip(i / LANES)[j].0[i % LANES]
     }
 }
 

@@ -10,7 +10,7 @@
 //! angle moves by `rate · Δt`, and ε has the variance of 1/30 s times Δt · 30. States are cut to their bounds and lifted
 //! or lowered until a foot stands on the floor; legs that go through each other have no weight.
 
-use super::colour_cue::{self, ColourCue, ColourScratch};
+use super::colour_cue::{self, ColourCue};
 use super::distance_cue::{self, DistanceCue, Distances};
 use super::foreground::Foreground;
 use super::projection_cue::{self, ProjectionCue, Scratch};
@@ -204,13 +204,12 @@ impl ParticleModel for LegParticleModel {
 
     fn log_likelihood(&mut self, observation: &Observation, _: &Particles, log_likelihood: &mut [f32]) {
         let (cues, power, arch) = (self.cues, self.likelihood_power, self.arch);
-        let width = observation.foreground.width;
-        log_likelihood.par_chunks_mut(CHUNK).zip(self.bodies.par_chunks(CHUNK)).for_each_init(
-            || (Scratch::new(width), ColourScratch::default()),
-            |(scratch, colours), (out, bodies)| {
-                arch.dispatch(WeighTask { observation, cues, power, bodies, scratch, colours, out });
-            },
-        );
+        log_likelihood
+            .par_chunks_mut(CHUNK)
+            .zip(self.bodies.par_chunks(CHUNK))
+            .for_each_init(Scratch::default, |scratch, (out, bodies)| {
+                arch.dispatch(WeighTask { observation, cues, power, bodies, scratch, out })
+            });
     }
 }
 
@@ -221,7 +220,6 @@ struct WeighTask<'a> {
     power: f64,
     bodies: &'a [Body],
     scratch: &'a mut Scratch,
-    colours: &'a mut ColourScratch,
     out: &'a mut [f32],
 }
 
@@ -249,7 +247,7 @@ impl WithSimd for WeighTask<'_> {
             if self.cues.has_colour()
                 && let Some(colour) = &self.observation.colour
             {
-                let Some(distance) = colour.distance(simd, &body.solids, self.colours) else { continue };
+                let Some(distance) = colour.distance(simd, &body.solids) else { continue };
                 log -= colour_cue::LAMBDA * distance;
             }
             if log.is_finite() {
@@ -270,7 +268,7 @@ impl WithSimd for FitTask<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Fit {
-        let mut scratch = Scratch::new(self.observation.foreground.width);
+        let mut scratch = Scratch::default();
         Fit {
             distances: self.observation.distance.distances(simd, self.solids),
             projection: self.observation.projection().distance(simd, self.solids, &mut scratch),

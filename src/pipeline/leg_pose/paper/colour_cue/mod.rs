@@ -15,9 +15,11 @@ pub mod histogram;
 
 use super::projection_cue::face::Faces;
 use super::projection_cue::is_in_front;
-use super::projection_cue::outline::{Outline, Outlines};
+use super::projection_cue::outline::Outline;
+use super::projection_cue::strip::Strip;
 use crate::body::legs::solids::SOLID_COUNT;
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::lanes::LANES;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
 use crate::recording::side_camera::{SideCamera, SideImages};
 use histogram::{BINS, ColumnSums, Histograms, Sums, add_pixel};
@@ -81,25 +83,14 @@ pub struct ColourCue {
     sums: [ColumnSums; 2],
 }
 
-/// Memory for one model at a time.
-#[derive(Debug, Clone, Default)]
-pub struct ColourScratch {
-    outlines: Vec<Outlines>,
-}
-
 impl ColourCue {
     /// Mean L1 distance of both histograms over segments and cameras, 0 to 4. `None` when a part of the model is behind a
     /// camera.
     #[inline(always)]
-    pub fn distance<S: Simd>(
-        &self,
-        simd: S,
-        solids: &[TaperedCylinder; SOLID_COUNT],
-        scratch: &mut ColourScratch,
-    ) -> Option<f64> {
+    pub fn distance<S: Simd>(&self, simd: S, solids: &[TaperedCylinder; SOLID_COUNT]) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0u32);
         for (template, sums) in self.templates.views.iter().zip(&self.sums) {
-            let regions = regions(simd, solids, template, sums, scratch)?;
+            let regions = regions(simd, solids, template, sums)?;
             for (template, region) in template.segments.iter().zip(&regions) {
                 let Some(template) = template else { continue };
                 let [colours, directions] = match Histograms::of_sums(region) {
@@ -121,7 +112,6 @@ fn regions<S: Simd>(
     solids: &[TaperedCylinder; SOLID_COUNT],
     view: &Template,
     sums: &ColumnSums,
-    scratch: &mut ColourScratch,
 ) -> Option<[Sums; SOLID_COUNT]> {
     let pose = &view.camera_from_sensor;
     let moved = solids.map(|solid| TaperedCylinder {
@@ -133,32 +123,26 @@ fn regions<S: Simd>(
     if !moved.iter().all(is_in_front) {
         return None;
     }
-    if scratch.outlines.len() != SOLID_COUNT {
-        scratch.outlines = vec![Outlines::new(sums.width); SOLID_COUNT];
-    }
+    let outlines = moved.each_ref().map(|solid| Outline::new(solid, &Faces::new(solid), &view.intrinsics, sums.width));
     let (mut first, mut last) = (sums.width, 0);
-    for (solid, outlines) in moved.iter().zip(&mut scratch.outlines) {
-        let faces = Faces::new(solid);
-        Outline::new(solid, &faces, &view.intrinsics, sums.width).trace(simd, &faces, &view.intrinsics, outlines);
-        first = first.min(outlines.columns.start);
-        last = last.max(outlines.columns.end);
+    for outline in &outlines {
+        first = first.min(outline.strips().start);
+        last = last.max(outline.strips().end);
     }
     // Nearest first.
     let middle = |k: usize| moved[k].start.z + moved[k].end.z;
     let mut order: [usize; SOLID_COUNT] = std::array::from_fn(|k| k);
     order.sort_unstable_by(|a, b| middle(*a).total_cmp(&middle(*b)));
     let mut regions = [[0.0; BINS]; SOLID_COUNT];
-    for column in first..last {
-        let mut free = Stretches::whole(sums.height);
-        for solid in order {
-            let outlines = &scratch.outlines[solid];
-            if !outlines.columns.contains(&column) {
-                continue;
+    for number in first..last {
+        let strip = Strip::new(number, &view.intrinsics, [sums.width, sums.height]);
+        let rows = outlines.each_ref().map(|outline| outline.trace(simd, &strip).whole);
+        for lane in 0..LANES.min(sums.width - number * LANES) {
+            let mut free = Stretches::whole(sums.height);
+            for solid in order {
+                let rows = [rows[solid][0].0[lane] as usize, rows[solid][1].0[lane] as usize];
+                free.take(rows, |rows| sums.add(number * LANES + lane, rows, &mut regions[solid]));
             }
-            let [low, high] = outlines.at(column).whole;
-            // Conversions saturate, also at infinity.
-            let rows = [low.ceil() as usize, ((high.floor() + 1.0) as usize).min(sums.height)];
-            free.take(rows, |rows| sums.add(column, rows, &mut regions[solid]));
         }
     }
     Some(regions)

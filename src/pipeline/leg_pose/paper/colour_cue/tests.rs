@@ -56,10 +56,9 @@ fn regions_are_the_pixels_that_each_segment_shows() {
     let cameras = cameras(&solids);
     let images = images(&solids);
     let templates = Templates::new(&cameras, &images).expect("labels");
-    let mut scratch = ColourScratch::default();
     let cue = templates.cue(&images);
     for (k, template) in templates.views.iter().enumerate() {
-        let found = regions(Scalar::new(), &solids, template, &cue.sums[k], &mut scratch).expect("in front");
+        let found = regions(Scalar::new(), &solids, template, &cue.sums[k]).expect("in front");
         let mut plain = [[0.0; BINS]; SOLID_COUNT];
         for (pixel, label) in cameras[k].labels.iter().enumerate().filter(|(_, label)| **label > 0) {
             add_pixel(&images[k], pixel % WIDTH, pixel / WIDTH, &mut plain[*label as usize - 1]);
@@ -80,16 +79,15 @@ fn the_labelled_state_is_nearest_and_distance_grows_with_what_is_wrong() {
     let (_, _, solids) = walking(0.7);
     let templates = Templates::new(&cameras(&solids), &images(&solids)).expect("labels");
     let cue = templates.cue(&images(&solids));
-    let mut scratch = ColourScratch::default();
-    let mut distance = |aside: f64| {
+    let distance = |aside: f64| {
         let moved = solids.map(|solid| TaperedCylinder {
             start: solid.start + Vector3::new(aside, 0.0, 0.0),
             end: solid.end + Vector3::new(aside, 0.0, 0.0),
             ..solid
         });
-        cue.distance(Scalar::new(), &moved, &mut scratch).expect("in front")
+        cue.distance(Scalar::new(), &moved).expect("in front")
     };
-    let distances = [0.0, 0.02, 0.05, 0.12].map(&mut distance);
+    let distances = [0.0, 0.02, 0.05, 0.12].map(distance);
     assert!(distances.windows(2).all(|pair| pair[0] < pair[1]), "{distances:?}");
     assert!(distances[0] < 0.5 && distances[3] < 4.0, "{distances:?}");
 }

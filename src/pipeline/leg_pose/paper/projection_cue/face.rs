@@ -12,8 +12,11 @@
 //!
 //! The first is the nearer root of the cone's quadratic in the form that does not cancel.
 
+use super::strip::{Span, Strip};
+use crate::geometry::lanes::Lanes;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
 use nalgebra::{Matrix3, Vector3};
+use pulp::Simd;
 
 /// Depth on one face.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -21,22 +24,13 @@ pub struct Face {
     c: f64,
     linear: Vector3<f64>,
     quadratic: Matrix3<f64>,
-}
-
-/// A face along a column: `z = c / (b0 + b1 k + √(e0 + e1 k + e2 k²))` at the k-th row from a first one.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FaceInColumn {
-    /// Numerator.
-    pub c: f32,
-    /// Linear part of the denominator.
-    pub b: [f32; 2],
-    /// Under the root.
-    pub e: [f32; 3],
+    /// Of the side: A = dᵀ (I − (1 + κ²) u uᵀ) d, which `(B·d)² − dᵀ M d = c A` holds for.
+    pub divisor: Matrix3<f64>,
 }
 
 impl Face {
     fn plane(normal: Vector3<f64>, point: &Vector3<f64>) -> Self {
-        Self { c: normal.dot(point), linear: normal, quadratic: Matrix3::zeros() }
+        Self { c: normal.dot(point), linear: normal, ..Self::default() }
     }
 
     fn side(solid: &TaperedCylinder, axis: &Vector3<f64>) -> Option<Self> {
@@ -50,45 +44,67 @@ impl Face {
             return None;
         }
         let linear = start - axis * (along - slope * radius_at_camera);
-        let quadratic =
-            linear * linear.transpose() - (Matrix3::identity() - axis * axis.transpose() * (1.0 + slope * slope)) * c;
-        Some(Self { c, linear, quadratic })
+        let divisor = Matrix3::identity() - axis * axis.transpose() * (1.0 + slope * slope);
+        let quadratic = linear * linear.transpose() - divisor * c;
+        Some(Self { c, linear, quadratic, divisor })
     }
 
-    /// The numerator `c`.
+    /// The face in a register of a strip's columns.
     #[inline(always)]
-    pub fn constant_f32(&self) -> f32 {
-        self.c as f32
-    }
-
-    /// B.
-    #[inline(always)]
-    pub fn linear_f32(&self) -> [f32; 3] {
-        [self.linear.x as f32, self.linear.y as f32, self.linear.z as f32]
-    }
-
-    /// The upper triangle of M: xx, xy, xz; yy, yz, zz.
-    #[inline(always)]
-    pub fn quadratic_f32(&self) -> [[f32; 3]; 2] {
-        let m = &self.quadratic;
-        [[m[(0, 0)] as f32, m[(0, 1)] as f32, m[(0, 2)] as f32], [m[(1, 1)] as f32, m[(1, 2)] as f32, m[(2, 2)] as f32]]
-    }
-
-    /// The face in the column at x, from the row at y on, rows `pitch` apart (x, y and pitch at depth 1).
-    #[inline(always)]
-    pub fn in_column(&self, x: f64, y: f64, pitch: f64) -> FaceInColumn {
-        let (b, m) = (&self.linear, &self.quadratic);
-        let across = m[(0, 1)] * x + m[(1, 2)];
-        let constant = (m[(0, 0)] * x + 2.0 * m[(0, 2)]) * x + m[(2, 2)];
-        FaceInColumn {
-            c: self.c as f32,
-            b: [(b.x * x + b.y * y + b.z) as f32, (b.y * pitch) as f32],
-            e: [
-                (constant + (2.0 * across + m[(1, 1)] * y) * y) as f32,
-                (2.0 * (across + m[(1, 1)] * y) * pitch) as f32,
-                (m[(1, 1)] * pitch * pitch) as f32,
-            ],
+    pub fn in_columns<S: Simd>(&self, simd: S, register: usize, strip: &Strip, span: &Span) -> FaceInColumns<S> {
+        let x = strip.x(simd, register);
+        let (b, [y, reach]) = (&self.linear, span.y);
+        let splat = |value: f64| Lanes::splat(simd, value as f32);
+        FaceInColumns {
+            constant: splat(self.c),
+            linear: [x.mul_add(splat(b.x), splat(b.y * y + b.z)), splat(b.y * reach)],
+            quadratic: quadratic_in_columns(simd, &self.quadratic, x, span),
+            span: span.lanes(simd),
+            zero: splat(0.0),
         }
+    }
+}
+
+/// `dᵀ M d` for the rays of columns at x, by powers of a span's `t`, constant first.
+#[inline(always)]
+pub fn quadratic_in_columns<S: Simd>(simd: S, m: &Matrix3<f64>, x: Lanes<S>, span: &Span) -> [Lanes<S>; 3] {
+    let [y, reach] = span.y;
+    let [square, across, constant] = Lanes::splat_point(
+        simd,
+        &[m.m11 as f32, (2.0 * (m.m12 * y + m.m13)) as f32, ((m.m22 * y + 2.0 * m.m23) * y + m.m33) as f32],
+    );
+    let [mixed, first, second] = Lanes::splat_point(
+        simd,
+        &[(2.0 * m.m12 * reach) as f32, (2.0 * reach * (m.m22 * y + m.m23)) as f32, (m.m22 * reach * reach) as f32],
+    );
+    [x.mul_add(x.mul_add(square, across), constant), x.mul_add(mixed, first), second]
+}
+
+/// Depth in a register of columns.
+pub trait DepthInColumns<S: Simd> {
+    /// Depth at a row of the image, metres.
+    fn depth(&self, row: Lanes<S>) -> Lanes<S>;
+}
+
+/// A face in a register of columns: `z = c / (b0 + b1 t + √(e0 + e1 t + e2 t²))`.
+#[derive(Debug, Clone, Copy)]
+pub struct FaceInColumns<S: Simd> {
+    constant: Lanes<S>,
+    /// b: B·d by powers of `t`.
+    pub linear: [Lanes<S>; 2],
+    /// e: dᵀ M d by powers of `t`.
+    pub quadratic: [Lanes<S>; 3],
+    span: [Lanes<S>; 2],
+    zero: Lanes<S>,
+}
+
+impl<S: Simd> DepthInColumns<S> for FaceInColumns<S> {
+    #[inline(always)]
+    fn depth(&self, row: Lanes<S>) -> Lanes<S> {
+        let t = row.mul_add(self.span[1], self.span[0]);
+        let [e0, e1, e2] = self.quadratic;
+        let squared = t.mul_add(t.mul_add(e2, e1), e0);
+        self.constant / (t.mul_add(self.linear[1], self.linear[0]) + squared.max(self.zero).sqrt())
     }
 }
 

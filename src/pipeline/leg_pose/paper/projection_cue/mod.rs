@@ -12,25 +12,27 @@
 //! ```
 //!
 //! The solids are convex, so each covers one interval of rows in a column, and its front consists of few smooth
-//! [`faces`](face) on which depth along a column has a closed form. The ends of the intervals are found for many columns
-//! at once ([`outline`]), and so are polynomials for the depth of the sides ([`smooth_side`]); in each column they are sorted, and where solids overlap the nearer depth is taken. There is
-//! no depth buffer. The paper rasterises polygons that circumscribe the cylinders; here the surfaces are exact, and solids
+//! [`faces`](face) on which depth along a column has a closed form. Sixteen columns, a [`strip`], are gone through together: the
+//! ends of the intervals are found in all of them at once ([`outline`]), faces are sorted by their first rows ([`runs`]), and
+//! where several are in a row the nearer depth is taken. There is no depth buffer of the image. The paper rasterises polygons that circumscribe the cylinders; here the surfaces are exact, and solids
 //! are closed by discs at their ends.
 
-pub mod column;
 pub mod face;
 pub mod outline;
-pub mod smooth_side;
+pub mod runs;
+pub mod side;
+pub mod strip;
 
 use super::foreground::Foreground;
 use crate::body::legs::solids::SOLID_COUNT;
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::lanes::LANES;
+use crate::geometry::lanes::Group;
 use crate::geometry::tapered_cylinder::TaperedCylinder;
-use column::{Column, ModelInImage};
 use face::Faces;
-use outline::{Outline, Outlines};
+use outline::Outline;
 use pulp::Simd;
+use runs::{Runs, Scene};
+use strip::Strip;
 
 /// Scale of the likelihood, 1/m (λ2 = 1/3 per mm).
 pub const LAMBDA_PER_M: f64 = 1000.0 / 3.0;
@@ -46,17 +48,9 @@ pub struct ProjectionCue<'a> {
 }
 
 /// Memory for one model at a time.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Scratch {
-    outlines: [Outlines; SOLID_COUNT],
-    column: Column,
-}
-
-impl Scratch {
-    /// Memory for images of a width.
-    pub fn new(width: usize) -> Self {
-        Self { outlines: std::array::from_fn(|_| Outlines::new(width)), column: Column::default() }
-    }
+    runs: Runs,
 }
 
 impl<'a> ProjectionCue<'a> {
@@ -78,30 +72,29 @@ impl<'a> ProjectionCue<'a> {
         }
         let Foreground { width, height, .. } = *self.foreground;
         let mut faces = [Faces::default(); SOLID_COUNT];
+        let mut outlines = <[Outline; SOLID_COUNT]>::default();
         let (mut first, mut last) = (width, 0);
         for k in 0..SOLID_COUNT {
-            let (solid, outlines) = (&solids[k], &mut scratch.outlines[k]);
-            faces[k] = Faces::new(solid);
-            Outline::new(solid, &faces[k], self.camera, width).trace(simd, &faces[k], self.camera, outlines);
-            first = first.min(outlines.columns.start);
-            last = last.max(outlines.columns.end);
+            faces[k] = Faces::new(&solids[k]);
+            outlines[k] = Outline::new(&solids[k], &faces[k], self.camera, width);
+            first = first.min(outlines[k].strips().start);
+            last = last.max(outlines[k].strips().end);
         }
-        let mut sums = [0.0f32; LANES];
-        let stride = self.foreground.stride();
-        let Scratch { outlines, column } = scratch;
-        let model = ModelInImage { faces: &faces, outlines, camera: self.camera };
-        for i in first..last {
-            column.clear(height);
-            for (solid, outlines) in outlines.iter().enumerate() {
-                if outlines.columns.contains(&i) {
-                    column.add_solid(solid, &outlines.at(i));
+        let mut sums = Group::default();
+        let runs = &mut scratch.runs;
+        for number in first..last {
+            let strip = Strip::new(number, self.camera, [width, height]);
+            let scene = Scene { faces: &faces, strip: &strip, camera: self.camera };
+            runs.clear();
+            for (solid, outline) in outlines.iter().enumerate() {
+                if outline.strips().contains(&number) {
+                    runs.add_solid(simd, &scene, solid, &outline.trace(simd, &strip));
                 }
             }
-            let depths = &self.foreground.columns[i * stride..(i + 1) * stride];
-            column.sum(simd, &model, i, depths, &mut sums);
+            runs.sum(simd, &scene, self.foreground.strip(number), &mut sums);
         }
         let mut sum = self.foreground.depth_sum;
-        for lane in sums {
+        for lane in sums.0 {
             sum += f64::from(lane);
         }
         Some(sum / (width * height) as f64)

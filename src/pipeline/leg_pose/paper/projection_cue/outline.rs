@@ -6,20 +6,17 @@
 //! extent is from the least to the greatest of those that the column meets. The disc that faces the camera and the flat
 //! side are bounded in the same way.
 
-use super::face::{FaceKind, Faces};
-use super::smooth_side::SmoothSides;
+use super::face::Faces;
+use super::strip::{Rows, Strip};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::lanes::{LANES, Lanes};
+use crate::geometry::lanes::{Group, LANES, Lanes};
 use crate::geometry::tapered_cylinder::TaperedCylinder;
 use nalgebra::Vector3;
 use pulp::Simd;
 use std::ops::Range;
 
-/// Rows from the first (at or after the first number) to the last (at or before the second); empty when they cross.
-pub type Rows = [f32; 2];
-
-/// Rows that a solid covers in one column.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Rows that a solid covers in a strip of columns.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Extents {
     /// The whole solid.
     pub whole: Rows,
@@ -27,56 +24,6 @@ pub struct Extents {
     pub disc: Rows,
     /// The flat side, when it faces the camera.
     pub flat: Rows,
-}
-
-/// Extents of a solid in all of its columns.
-#[derive(Debug, Clone)]
-pub struct Outlines {
-    /// Columns that the solid may cover.
-    pub columns: Range<usize>,
-    /// Whole solid, disc and flat side: first and last row, by column.
-    rows: [[Vec<f32>; 2]; 3],
-    /// Depth of the side.
-    pub sides: SmoothSides,
-}
-
-/// A register of neighbouring columns.
-#[derive(Debug, Clone, Copy)]
-pub struct Columns<S: Simd> {
-    /// The first of them.
-    pub first: usize,
-    /// Their x at depth 1.
-    pub x: Lanes<S>,
-    /// Distance between rows at depth 1.
-    pub row_pitch: f32,
-    focal: [Lanes<S>; 2],
-}
-
-impl<S: Simd> Columns<S> {
-    /// The row at a y at depth 1.
-    #[inline(always)]
-    pub fn row(&self, y: Lanes<S>) -> Lanes<S> {
-        y.mul_add(self.focal[0], self.focal[1])
-    }
-}
-
-impl Outlines {
-    /// Memory for images of a width.
-    pub fn new(width: usize) -> Self {
-        let rows = || vec![0.0; width + LANES];
-        Self { columns: 0..0, rows: std::array::from_fn(|_| [rows(), rows()]), sides: SmoothSides::new(width) }
-    }
-
-    /// Extents in a column.
-    #[inline(always)]
-    pub fn at(&self, column: usize) -> Extents {
-        let [whole, disc, flat] = &self.rows;
-        Extents {
-            whole: [whole[0][column], whole[1][column]],
-            disc: [disc[0][column], disc[1][column]],
-            flat: [flat[0][column], flat[1][column]],
-        }
-    }
 }
 
 /// A disc or half disc.
@@ -112,7 +59,7 @@ impl Edge {
 const MAX_EDGES: usize = 6;
 
 /// What bounds a solid.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Outline {
     columns: Range<usize>,
     axis: [f32; 3],
@@ -201,33 +148,27 @@ impl Outline {
         }
     }
 
-    /// Computes the extents in all columns.
+    /// Strips that hold the columns that the solid may cover.
     #[inline(always)]
-    pub fn trace<S: Simd>(&self, simd: S, faces: &Faces, camera: &Intrinsics, outlines: &mut Outlines) {
-        const NUMBERS: [f32; LANES] =
-            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
-        outlines.columns = self.columns.clone();
-        let numbers = S::as_simd_f32s(&NUMBERS).0;
-        let pitch = Lanes::splat(simd, (1.0 / camera.fx) as f32);
-        let focal = [Lanes::splat(simd, camera.fy as f32), Lanes::splat(simd, camera.cy as f32)];
-        let mut first = self.columns.start;
-        while first < self.columns.end {
-            let x0 = Lanes::splat(simd, ((first as f64 - camera.cx) / camera.fx) as f32);
-            for (register, number) in numbers.iter().enumerate() {
-                let x = Lanes::new(simd, *number).mul_add(pitch, x0);
-                let at = first + register * S::F32_LANES;
-                let columns = Columns { first: at, x, row_pitch: (1.0 / camera.fy) as f32, focal };
-                let extents = self.extents(simd, x);
-                for (part, extent) in extents.iter().enumerate() {
-                    for (side, y) in extent.iter().enumerate() {
-                        let rows = &mut outlines.rows[part][side][at..at + S::F32_LANES];
-                        S::as_mut_simd_f32s(rows).0[0] = columns.row(*y).values;
-                    }
-                }
-                outlines.sides.fit(simd, faces.face(FaceKind::Side), &columns, &extents[0]);
+    pub fn strips(&self) -> Range<usize> {
+        self.columns.start / LANES..self.columns.end.div_ceil(LANES)
+    }
+
+    /// Computes the extents in a strip.
+    #[inline(always)]
+    pub fn trace<S: Simd>(&self, simd: S, strip: &Strip) -> Extents {
+        let mut traced = Extents::default();
+        for register in 0..Group::registers::<S>() {
+            let [whole, disc, flat] = self.extents(simd, strip.x(simd, register));
+            set_rows(&mut traced.whole, register, strip.rows(simd, whole));
+            if self.facing.is_some() {
+                set_rows(&mut traced.disc, register, strip.rows(simd, disc));
             }
-            first += LANES;
+            if self.shows_flat {
+                set_rows(&mut traced.flat, register, strip.rows(simd, flat));
+            }
         }
+        traced
     }
 
     /// Extents of the solid, of its disc and of its flat side in columns, at depth 1.
@@ -295,6 +236,12 @@ impl Outline {
             Lanes::new(simd, simd.select_f32s(is_seen, a.max(b).values, none_high.values)),
         ]
     }
+}
+
+#[inline(always)]
+fn set_rows<S: Simd>(rows: &mut Rows, register: usize, lanes: [Lanes<S>; 2]) {
+    rows[0].set(register, lanes[0]);
+    rows[1].set(register, lanes[1]);
 }
 
 /// Widens an extent so that it holds another one.

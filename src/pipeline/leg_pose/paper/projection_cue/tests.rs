@@ -1,8 +1,9 @@
-use super::super::scene::{CAMERA, WIDTH, any_state, floor, foreground, image, walking};
+use super::super::render::render;
+use super::super::scene::{CAMERA, REGION, WIDTH, any_state, floor, foreground, image, walking};
 use super::*;
 use crate::body::legs::solids::solids;
 use crate::body::legs::{LegState, forward_kinematics};
-use crate::geometry::camera::DepthMap;
+use crate::geometry::camera::{DepthMap, Intrinsics};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use pulp::{Arch, Scalar, WithSimd};
@@ -14,7 +15,7 @@ impl WithSimd for Task<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<f64> {
-        ProjectionCue::new(self.0, &CAMERA).distance(simd, self.1, &mut Scratch::new(WIDTH))
+        ProjectionCue::new(self.0, &CAMERA).distance(simd, self.1, &mut Scratch::default())
     }
 }
 
@@ -50,6 +51,50 @@ proptest! {
         let nothing = foreground(&DepthMap::empty(WIDTH, super::super::scene::HEIGHT));
         let state = any_state(&shares);
         check(&nothing, &solids(&state, &forward_kinematics(&state, &floor())), 1e-3);
+    }
+}
+
+/// Legs at any place, as seen by a camera whose columns fill no whole strips: cut by every edge of the image, one behind the
+/// other, near and far.
+fn check_by_narrow_camera(shares: &[f64; 23], shift: [f64; 3]) {
+    const SIZE: [usize; 2] = [149, 113];
+    const NARROW: Intrinsics = Intrinsics { fx: 131.0, fy: 127.0, cx: 70.3, cy: 60.2 };
+    struct Narrow<'a>(&'a Foreground, &'a [TaperedCylinder; SOLID_COUNT]);
+    impl WithSimd for Narrow<'_> {
+        type Output = Option<f64>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Option<f64> {
+            ProjectionCue::new(self.0, &NARROW).distance(simd, self.1, &mut Scratch::default())
+        }
+    }
+    let moved = |solids: [TaperedCylinder; SOLID_COUNT]| {
+        let shift = Vector3::from(shift);
+        solids.map(|solid| TaperedCylinder { start: solid.start + shift, end: solid.end + shift, ..solid })
+    };
+    let image = render(&walking(1.0).2, &NARROW, SIZE[0], SIZE[1]);
+    let seen = Foreground::find(&image, &DepthMap::empty(SIZE[0], SIZE[1]), &NARROW, &REGION, 4.0);
+    let state = any_state(shares);
+    let solids = moved(solids(&state, &forward_kinematics(&state, &floor())));
+    let plain = reference::distance(&solids, &seen, &NARROW);
+    let fast = Arch::new().dispatch(Narrow(&seen, &solids));
+    assert_eq!(fast, Narrow(&seen, &solids).with_simd(Scalar::new()), "the instruction sets differ");
+    match (fast, plain) {
+        (Some(fast), Some(plain)) => assert!((fast - plain).abs() < 1e-3 * plain.max(1e-3), "{fast} against {plain}"),
+        _ => assert_eq!(fast, plain),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+    #[test]
+    fn legs_that_the_images_edges_cut_have_the_plain_sum_too(
+        shares in prop::array::uniform23(0.0..1.0f64),
+        x in -0.9..0.9f64,
+        y in -0.8..0.8f64,
+        z in -0.4..1.5f64,
+    ) {
+        check_by_narrow_camera(&shares, [x, y, z]);
     }
 }
 

@@ -58,7 +58,7 @@ fn one_and_three_threads_give_the_same_bytes() {
 
 #[test]
 fn a_track_is_found_again_after_the_camera_was_covered() {
-    let mut tracker = tracker(LegCues::Both, 500);
+    let mut tracker = tracker(LegCues::Both, 2000);
     let nothing = DepthMap::empty(WIDTH, HEIGHT);
     let mut found = Vec::new();
     for frame in 0..40 {
