@@ -8,7 +8,7 @@ use time::macros::datetime;
 
 /// A store with one organisation, an admin and a device in it, and one session of the admin's.
 pub(super) struct Clinic {
-    _dir: TempDir,
+    pub(super) dir: TempDir,
     places: Places,
     pub(super) clock: ManualClock,
     pub(super) store: Store,
@@ -29,7 +29,21 @@ impl Clinic {
         let device = store.create_client(organisation, Role::Device, "camera").await.unwrap().0.access();
         let patient = store.create_patient(&admin, &new_patient("P-1")).await.unwrap().id;
         let session = store.create_session(&admin, &new_session(patient)).await.unwrap().id;
-        Self { _dir: dir, places, clock, store, admin, device, patient, session }
+        Self { dir, places, clock, store, admin, device, patient, session }
+    }
+
+    /// The same store as another process opens it.
+    pub(super) async fn reopen(&self) -> Store {
+        Store::open_at(&self.places, Arc::new(self.clock.clone())).await.unwrap()
+    }
+
+    /// True where a test that looks into SQLite's file has nothing to look into.
+    pub(super) fn rows_are_elsewhere(&self) -> bool {
+        let elsewhere = self.places.database_url.is_some();
+        if elsewhere {
+            println!("skipped: the rows are in PostgreSQL, and this test looks into SQLite's file");
+        }
+        elsewhere
     }
 
     /// Stores a recording as the upload does, without a job.
@@ -114,7 +128,7 @@ fn is_absent<T: std::fmt::Debug>(answer: Result<T, StorageError>, what: &str) {
 async fn a_store_opens_again_with_what_was_committed() {
     let clinic = Clinic::open().await;
     clinic.store.close().await;
-    let store = Store::open_at(&clinic.places, Arc::new(clinic.clock.clone())).await.unwrap();
+    let store = clinic.reopen().await;
     store.check_ready().await.unwrap();
     assert_eq!(store.session(&clinic.admin, clinic.session).await.unwrap().patient_id, clinic.patient);
 }

@@ -41,7 +41,7 @@ async fn tamper(clinic: &Clinic, statements: &[&'static str]) {
     let file = clinic.dir.path().join("surefoot.sqlite");
     let mut connection = sqlx::sqlite::SqliteConnectOptions::new().filename(file).connect().await.unwrap();
     for statement in statements {
-        query(*statement).execute(&mut connection).await.unwrap();
+        sqlx::query(*statement).execute(&mut connection).await.unwrap();
     }
     connection.close().await.unwrap();
 }
@@ -71,6 +71,9 @@ async fn an_entry_knows_the_patient_of_its_thing_and_holds_no_id() {
 #[tokio::test]
 async fn a_whole_chain_is_told_from_one_that_was_changed_removed_or_cut() {
     let clinic = with_entries(5).await;
+    if clinic.rows_are_elsewhere() {
+        return;
+    }
     let whole = clinic.store.verify_audit(None).await.unwrap();
     assert_eq!((whole.n_entries, whole.head_sequence, &whole.broken), (5, 5, &None));
     tamper(&clinic, &UNLOCK).await;
@@ -113,6 +116,9 @@ async fn entries_cannot_be_changed_or_removed_and_anchors_neither() {
 #[tokio::test]
 async fn retention_removes_the_old_end_and_the_chain_holds_from_its_anchor_on() {
     let clinic = with_entries(5).await;
+    if clinic.rows_are_elsewhere() {
+        return;
+    }
     let limit = clinic.store.now() - Duration::days(2) - Duration::hours(1);
     assert_eq!(clinic.store.count_audit_before(limit).await.unwrap(), 3);
     assert_eq!(clinic.store.remove_audit_before(limit, Actor::operator(None)).await.unwrap(), 3);
@@ -146,7 +152,7 @@ async fn the_trail_writes_reads_together_and_a_change_before_it_returns() {
 #[tokio::test]
 async fn two_processes_write_one_chain() {
     let clinic = Clinic::open().await;
-    let other = Store::open(clinic.dir.path()).await.unwrap();
+    let other = clinic.reopen().await;
     let write = async |store: &Store| -> Result<(), StorageError> {
         for _ in 0..20 {
             store.audit(&[event(store, &clinic, "GET /")]).await?;
