@@ -111,7 +111,7 @@ async fn nothing_of_an_erased_patient_is_left_in_any_file() {
     // The service goes on, and a further write brings nothing back.
     marked(&clinic, "afterwards").await;
     assert_eq!(files_with(clinic.dir.path(), &marks), [""; 0]);
-    assert_eq!(clinic.store.ailments(true).await.unwrap(), []);
+    assert!(clinic.store.ailments(true).await.unwrap().iter().all(|ailment| !ailment.is_damage));
 
     let (again, _) = clinic.store.erase_patient(&order(&clinic.admin, patient, Some("anything"))).await.unwrap();
     assert_eq!(again, erasure);
