@@ -111,9 +111,11 @@ impl App {
         }
     }
 
-    /// Id of a new session of a new patient.
+    /// Id of a new session of a new patient, who has consented.
     pub async fn session(&self, pseudonym: &str) -> String {
         let patient = self.post("/v1/patients", &json!({"pseudonym": pseudonym})).await;
+        let consents = format!("/v1/patients/{}/consents", patient["id"].as_str().expect("an id"));
+        self.post(&consents, &json!({"scope": "assessment", "text_version": "test"})).await;
         let session = self.post("/v1/sessions", &json!({"patient_id": patient["id"]})).await;
         session["id"].as_str().expect("an id").to_owned()
     }
