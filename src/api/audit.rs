@@ -145,7 +145,7 @@ impl From<AuditEntry> for AuditEntryResponse {
 /// Who did or read what in the organisation, newest first, in pages: every request with a key or a sign-in, with its outcome, and
 /// what the operator's commands and the retention rules did. Entries hold no clinical values. `surefoot audit verify` checks the
 /// chain.
-#[utoipa::path(get, path = "/v1/audit", tag = "audit", operation_id = "list_audit_entries", params(AuditQuery),
+#[utoipa::path(get, path = "/v1/audit", tag = "audit", operation_id = "list_audit_entries", security(("api_key" = ["admin"])), params(AuditQuery),
     responses((status = 200, description = "One page", body = Page<AuditEntryResponse>),
               (status = 503, description = "The log cannot be written at the moment", body = super::error::Problem,
                content_type = "application/problem+json")))]

@@ -158,7 +158,7 @@ pub struct WithdrawalResponse {
 ///
 /// Who recorded it is the holder of the key. A consent to `assessment` must be valid when a recording of the patient is
 /// uploaded or a job is asked for.
-#[utoipa::path(post, path = "/v1/patients/{id}/consents", tag = "consents", operation_id = "record_consent",
+#[utoipa::path(post, path = "/v1/patients/{id}/consents", tag = "consents", operation_id = "record_consent", security(("api_key" = ["clinician"])),
     params(PatientPath), request_body = ConsentRequest,
     responses((status = 201, description = "Recorded", body = ConsentResponse)))]
 async fn record_consent(
@@ -185,7 +185,7 @@ async fn record_consent(
 /// List consents
 ///
 /// All of a patient's, newest first, and whether recordings may be uploaded and assessed.
-#[utoipa::path(get, path = "/v1/patients/{id}/consents", tag = "consents", operation_id = "list_consents",
+#[utoipa::path(get, path = "/v1/patients/{id}/consents", tag = "consents", operation_id = "list_consents", security(("api_key" = ["clinician"])),
     params(PatientPath),
     responses((status = 200, description = "Every consent of the patient", body = ConsentsResponse)))]
 async fn list_consents(
@@ -202,7 +202,7 @@ async fn list_consents(
 /// Ends every consent to the scope. With the one to `assessment` processing stops: uploads under way are refused, jobs that
 /// wait are cancelled, jobs that run are stopped and nothing of them is stored, and no upload or job is taken any more. What was
 /// stored before stays until it is erased. Asking again changes nothing.
-#[utoipa::path(post, path = "/v1/patients/{id}/consents/withdrawal", tag = "consents", operation_id = "withdraw_consent",
+#[utoipa::path(post, path = "/v1/patients/{id}/consents/withdrawal", tag = "consents", operation_id = "withdraw_consent", security(("api_key" = ["clinician"])),
     params(PatientPath), request_body = WithdrawalRequest,
     responses((status = 200, description = "What it came to", body = WithdrawalResponse)))]
 async fn withdraw_consent(

@@ -75,7 +75,7 @@ impl From<Erasure> for ErasureResponse {
 ///
 /// The header `X-Confirm-Pseudonym` must hold the patient's pseudonym (a header, because addresses end up in logs). Asking again
 /// changes nothing and answers with the same record, and needs no confirmation that is right.
-#[utoipa::path(delete, path = "/v1/patients/{id}", tag = "patients", operation_id = "erase_patient",
+#[utoipa::path(delete, path = "/v1/patients/{id}", tag = "patients", operation_id = "erase_patient", security(("api_key" = ["admin"])),
     params(PatientPath, ("X-Confirm-Pseudonym" = String, Header, description = "Pseudonym of the patient who is to be erased",
         pattern = "^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")),
     responses((status = 200, description = "Erased", body = ErasureResponse),

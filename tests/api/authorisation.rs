@@ -11,7 +11,14 @@ use surefoot::config::Config;
 use surefoot::storage::Role;
 
 /// Operations without a key.
-const OPEN: [&str; 4] = ["fhir_metadata", "read_liveness", "read_readiness", "read_metrics"];
+const OPEN: [&str; 6] = [
+    "fhir_metadata",
+    "read_liveness",
+    "read_readiness",
+    "read_metrics",
+    "read_upload_options",
+    "read_upload_options_of_session",
+];
 /// What stands before an id that is the same for every organisation.
 const PUBLIC_IDS: [&str; 1] = ["protocols"];
 
@@ -99,6 +106,10 @@ impl House {
         let share = json!({"receiver_id": receiver.id, "expires_at": tomorrow()});
         let made = app.post(&format!("/v1/patients/{patient}/shares")).json(&share).send().await;
         ids.insert("shares", text(&made.expect(StatusCode::CREATED)["id"]).to_owned());
+        let begun = app.post(&format!("/v1/sessions/{}/uploads", ids["sessions"])).header("tus-resumable", "1.0.0");
+        let begun = begun.header("upload-length", "100").send().await;
+        begun.expect(StatusCode::CREATED);
+        ids.insert("uploads", begun.header("location").rsplit('/').next().unwrap().to_owned());
         ids.insert("noise-models", trained_model(&app, &ids["sessions"]).await);
         Self { app, ids }
     }
@@ -111,7 +122,7 @@ impl House {
             path.push('/');
             match part {
                 "{id}" if PUBLIC_IDS.contains(&before) => path.push_str("sit_to_stand"),
-                "{id}" => {
+                "{id}" | "{upload_id}" => {
                     let id = self.ids.get(before).unwrap_or_else(|| panic!("{}: whose id is it?", operation.path));
                     path.push_str(id);
                 }
@@ -142,6 +153,13 @@ impl House {
         let call = self.app.request(operation.method.clone(), &path);
         match operation.id.as_str() {
             "upload_recording" => call.body("application/json", samples::json_recording()),
+            "create_upload" => call.header("tus-resumable", "1.0.0").header("upload-length", "100"),
+            "read_upload_offset" | "terminate_upload" => call.header("tus-resumable", "1.0.0"),
+            "continue_upload" => {
+                let call = call.header("tus-resumable", "1.0.0").header("upload-offset", "0");
+                call.body("application/offset+octet-stream", vec![0; 10])
+            }
+            "erase_patient" => call.header("x-confirm-pseudonym", "P-1"),
             id if [Method::POST, Method::PATCH, Method::PUT].contains(&operation.method) => {
                 call.json(&self.body_of(id))
             }
@@ -163,6 +181,8 @@ impl House {
             "create_noise_model" => {
                 json!({"name": "theirs", "static_recordings": [self.ids["recordings"], self.ids["jobs"]]})
             }
+            "record_consent" => json!({"scope": "assessment", "text_version": "1"}),
+            "withdraw_consent" => json!({"scope": "assessment"}),
             "add_questionnaire" => json!({"falls_12_months": 1}),
             "add_measurement" => measurement(),
             "add_training_plan" => json!({"sessions_per_week": 3, "exercises": [{"protocol": "back_knee"}]}),
@@ -250,10 +270,15 @@ async fn every_operation_holds_the_walls_that_the_document_names() {
 
         let answer = house.ask(&operation).key(&stranger).send().await;
         let has_own_id = operation.path.split('/').zip(operation.path.split('/').skip(1));
-        let has_own_id = has_own_id.into_iter().any(|(before, part)| part == "{id}" && !PUBLIC_IDS.contains(&before));
+        let has_own_id = has_own_id
+            .into_iter()
+            .any(|(before, part)| ["{id}", "{upload_id}"].contains(&part) && !PUBLIC_IDS.contains(&before));
         let names_patient = operation.query.iter().any(|(name, is_required)| *is_required && name == "patient");
         if has_own_id || names_patient || operation.id == "create_session" {
-            answer.refused(404, "not_found");
+            match operation.method {
+                Method::HEAD => assert_eq!(answer.status, StatusCode::NOT_FOUND, "{what}"),
+                _ => drop(answer.refused(404, "not_found")),
+            }
             absent += 1;
         } else if operation.id == "create_noise_model" {
             let problem = answer.refused(422, "invalid_body");

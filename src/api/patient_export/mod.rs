@@ -38,7 +38,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 /// as CSV and joint places as TRC, measures, answers, results of tests, plans, the report as JSON and as FHIR R4, and the audit
 /// entries about the patient. `manifest.json`, the last file, lists all others with their digests; an archive without it was cut
 /// off. JSON files have the shapes that the API gives: each is one object or an array of them.
-#[utoipa::path(get, path = "/v1/patients/{id}/export", tag = "patients", operation_id = "export_patient",
+#[utoipa::path(get, path = "/v1/patients/{id}/export", tag = "patients", operation_id = "export_patient", security(("api_key" = ["admin"])),
     params(PatientPath),
     responses((status = 200, description = "The archive", content((Vec<u8> = "application/zip")))))]
 async fn export_patient(

@@ -42,7 +42,8 @@ macro_rules! uploads {
 }
 
 /// Everything that hangs on a patient: what refers to something comes before it.
-const TABLES: [(&str, &str); 14] = [
+const TABLES: [(&str, &str); 15] = [
+    ("shares", "DELETE FROM shares WHERE patient_id = $1"),
     ("resumable_uploads", concat!("DELETE FROM resumable_uploads WHERE id IN (", uploads!(), ")")),
     ("measures", "DELETE FROM measures WHERE patient_id = $1"),
     ("joint_tracks", concat!("DELETE FROM joint_tracks WHERE assessment_id IN (", assessments!(), ")")),

@@ -147,7 +147,7 @@ impl TryFrom<ResumableUpload> for ResumableUploadResponse {
 ///
 /// `Upload-Metadata` may hold `filetype` (the content type, as of a direct upload), `sha256` (hexadecimal, of the whole
 /// recording, compared at the end) and `filename`, which is given back by HEAD and forgotten with the last byte.
-#[utoipa::path(post, path = "/v1/sessions/{id}/uploads", tag = "recordings", operation_id = "create_upload",
+#[utoipa::path(post, path = "/v1/sessions/{id}/uploads", tag = "recordings", operation_id = "create_upload", security(("api_key" = ["device"])),
     params(SessionPath,
         ("Tus-Resumable" = String, Header, description = "Version of the protocol", pattern = "^1\\.0\\.0$"),
         ("Upload-Length" = u64, Header, description = "Bytes of the whole recording", minimum = 1),
@@ -245,7 +245,7 @@ fn options(state: &AppState) -> Response {
 /// Read what became of a resumable upload
 ///
 /// The recording and its job once they are stored, or why it was refused; how many bytes have arrived until then.
-#[utoipa::path(get, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "read_upload",
+#[utoipa::path(get, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "read_upload", security(("api_key" = ["device"])),
     params(ResumableUploadPath),
     responses((status = 200, description = "The upload", body = ResumableUploadResponse,
                 headers(("Tus-Resumable" = String, description = "Version of the protocol"))),
@@ -268,7 +268,7 @@ async fn read_upload(
 /// Ask how much of a resumable upload has arrived
 ///
 /// `Upload-Offset` is where the next PATCH goes on. Of an upload that was refused, the answer has the status of the refusal.
-#[utoipa::path(head, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "read_upload_offset",
+#[utoipa::path(head, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "read_upload_offset", security(("api_key" = ["device"])),
     params(ResumableUploadPath,
         ("Tus-Resumable" = String, Header, description = "Version of the protocol", pattern = "^1\\.0\\.0$")),
     responses(
@@ -309,7 +309,7 @@ async fn read_upload_offset(
 /// When the last byte has arrived, the recording passes the same checks as a direct upload before this is answered: a refusal
 /// is the answer to this request, and stays the answer. GET then names the recording and its job. A client that missed the
 /// answer may ask for it again by a PATCH without a body at the end.
-#[utoipa::path(patch, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "continue_upload",
+#[utoipa::path(patch, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "continue_upload", security(("api_key" = ["device"])),
     params(ResumableUploadPath,
         ("Tus-Resumable" = String, Header, description = "Version of the protocol", pattern = "^1\\.0\\.0$"),
         ("Upload-Offset" = u64, Header, description = "Bytes that have arrived"),
@@ -381,7 +381,7 @@ async fn add(
 /// Give up a resumable upload
 ///
 /// What has arrived is removed. A recording that was stored stays.
-#[utoipa::path(delete, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "terminate_upload",
+#[utoipa::path(delete, path = "/v1/uploads/{upload_id}", tag = "recordings", operation_id = "terminate_upload", security(("api_key" = ["device"])),
     params(ResumableUploadPath,
         ("Tus-Resumable" = String, Header, description = "Version of the protocol", pattern = "^1\\.0\\.0$")),
     responses(
