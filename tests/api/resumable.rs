@@ -241,10 +241,28 @@ async fn two_who_bring_the_last_bytes_at_once_make_one_recording() {
     let upload = begun(&app, bytes.len(), &[]).await;
     let bring = || patch(&app, &upload, 0, bytes.clone()).send();
     let answers = futures::join!(bring(), bring(), bring());
-    let good = [&answers.0, &answers.1, &answers.2].iter().filter(|one| one.status == StatusCode::NO_CONTENT).count();
-    assert!(good >= 1, "{answers:?}");
+    let status = [&answers.0, &answers.1, &answers.2].map(|answer| answer.status.as_u16());
+    assert!(status.contains(&204) && status.iter().all(|status| [204, 409].contains(status)), "{answers:?}");
     let list = app.get("/v1/recordings").send().await.expect(StatusCode::OK);
     assert_eq!(list["items"].as_array().unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn whoever_asks_while_the_recording_is_looked_at_waits_and_is_told_its_end() {
+    let app = TestApp::new().await;
+    let bytes = samples::mcap_recording();
+    let upload = begun(&app, bytes.len(), &[]).await;
+    patch(&app, &upload, 0, bytes[..100].to_vec()).send().await.expect(StatusCode::NO_CONTENT);
+    let last = patch(&app, &upload, 100, bytes[100..].to_vec()).send();
+    let heads = async {
+        let mut offsets = Vec::new();
+        while offsets.last().is_none_or(|last: &String| *last != bytes.len().to_string()) {
+            offsets.push(offset(&app, &upload).await);
+        }
+        offset(&app, &upload).await
+    };
+    let (last, end) = futures::join!(last, heads);
+    assert_eq!((last.status, end), (StatusCode::NO_CONTENT, bytes.len().to_string()));
 }
 
 #[tokio::test]

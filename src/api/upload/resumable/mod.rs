@@ -289,16 +289,23 @@ async fn read_upload_offset(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     Headers::from_headers(&headers).map_err(refusal)?;
-    let upload = finishing::outcome(alive(&state, &caller, path.upload_id).await?)?;
-    if upload.state == ResumableState::Stored {
-        return Ok(([(OFFSET, upload.length_bytes), (LENGTH, upload.length_bytes)]
-            .map(|(name, number)| (name, number.to_string())))
-        .into_response());
+    let mut upload = finishing::outcome(alive(&state, &caller, path.upload_id).await?)?;
+    if upload.state == ResumableState::Receiving {
+        let protocol = state.transfers.protocol(&state, caller.access);
+        match protocol.head(&protocol_id(upload.id)?).await {
+            Ok(answer) => {
+                let expires = [(EXPIRES, http_date(upload.expires_at)?)];
+                return Ok((answer.status, answer.headers, expires).into_response());
+            }
+            // While this request waited for its turn, the upload came to its end.
+            Err(tus_protocol::Error::NotFound(_)) => {
+                upload = finishing::outcome(alive(&state, &caller, path.upload_id).await?)?;
+            }
+            Err(error) => return Err(refusal(error)),
+        }
     }
-    let protocol = state.transfers.protocol(&state, caller.access);
-    let answer = protocol.head(&protocol_id(upload.id)?).await.map_err(refusal)?;
-    let expires = [(EXPIRES, http_date(upload.expires_at)?)];
-    Ok((answer.status, answer.headers, expires).into_response())
+    let length = upload.length_bytes.to_string();
+    Ok([(OFFSET, length.clone()), (LENGTH, length)].into_response())
 }
 
 /// Go on with a resumable upload
@@ -364,18 +371,35 @@ async fn add(
     has_checksum: bool,
     body: Body,
 ) -> Result<ResumableUpload, ApiError> {
+    let at = asked.upload_offset;
     if upload.state == ResumableState::Stored {
-        return match asked.upload_offset {
-            Some(at) if at == upload.length_bytes => Ok(upload),
-            at => Err(offset_mismatch(upload.length_bytes, at.unwrap_or(0))),
-        };
+        return at_the_end(upload, at);
     }
     let protocol = state.transfers.protocol(state, caller.access);
-    let reached = receiving::receive(&protocol, &upload, asked, has_checksum, body, &state.shutdown).await?;
+    let received = receiving::receive(&protocol, &upload, asked, has_checksum, body, &state.shutdown).await;
+    let reached = match received {
+        Ok(reached) => reached,
+        Err(error) => {
+            // While this request waited for its turn, another one may have brought the upload to its end.
+            let upload = state.store.resumable_upload(&caller.access, upload.id).await?;
+            if upload.state == ResumableState::Receiving {
+                return Err(error);
+            }
+            return at_the_end(finishing::outcome(upload)?, at);
+        }
+    };
     if reached == upload.length_bytes {
         return finishing::finish(state, upload.id).await;
     }
     Ok(state.store.resumable_upload(&caller.access, upload.id).await?)
+}
+
+/// The answer to bytes for an upload that is stored: all of them are there.
+fn at_the_end(upload: ResumableUpload, at: Option<u64>) -> Result<ResumableUpload, ApiError> {
+    match at {
+        Some(at) if at == upload.length_bytes => Ok(upload),
+        at => Err(offset_mismatch(upload.length_bytes, at.unwrap_or(0))),
+    }
 }
 
 /// Give up a resumable upload

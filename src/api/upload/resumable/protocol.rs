@@ -105,6 +105,9 @@ pub(super) fn refusal(error: Error) -> ApiError {
             told(412, "tus_version", "This address speaks tus 1.0.0: send the header `Tus-Resumable: 1.0.0`.")
         }
         Error::OffsetMismatch { expected, actual } => offset_mismatch(expected, actual),
+        Error::CompletedUploadModificationForbidden(_) => {
+            told(409, "offset_mismatch", "All bytes of this upload have arrived. HEAD and GET tell what became of it.")
+        }
         Error::SizeExceeded { max, .. } => ApiError::TooLarge(max),
         Error::Locked(_) | Error::LockTimeout(_) => told(
             423,
