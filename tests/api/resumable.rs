@@ -182,7 +182,7 @@ async fn another_digest_at_the_end_is_refused_and_stays_refused() {
     let head = tus(&app, Method::HEAD, &upload).open().await;
     assert_eq!(head.status(), StatusCode::UNPROCESSABLE_ENTITY);
     assert_eq!((files(&app), app.stored_uploads().await), (0, 0), "a file stayed");
-    assert_eq!(app.get("/v1/recordings").send().await.expect(StatusCode::OK)["items"], json!([]));
+    assert_eq!(app.get("/v1/jobs").send().await.expect(StatusCode::OK)["items"], json!([]));
 }
 
 #[tokio::test]
@@ -211,7 +211,7 @@ async fn whoever_missed_the_answer_to_the_last_byte_asks_again() {
         look_after(&app.state).await.unwrap();
     }
     patch(&app, &upload, 0, bytes).send().await.refused(409, "offset_mismatch");
-    let list = app.get("/v1/recordings").send().await.expect(StatusCode::OK);
+    let list = app.get("/v1/jobs").send().await.expect(StatusCode::OK);
     assert_eq!(list["items"].as_array().unwrap().len(), 1);
 }
 
@@ -229,7 +229,7 @@ async fn an_upload_whose_service_died_after_the_last_byte_is_finished() {
     look_after(&app.state).await.unwrap();
     look_after(&app.state).await.unwrap();
     assert_eq!(text(&read(&app, &upload).await["state"]), "stored");
-    let list = app.get("/v1/recordings").send().await.expect(StatusCode::OK);
+    let list = app.get("/v1/jobs").send().await.expect(StatusCode::OK);
     assert_eq!(list["items"].as_array().unwrap().len(), 1);
     assert_eq!(files(&app), 0);
 }
@@ -243,7 +243,7 @@ async fn two_who_bring_the_last_bytes_at_once_make_one_recording() {
     let answers = futures::join!(bring(), bring(), bring());
     let status = [&answers.0, &answers.1, &answers.2].map(|answer| answer.status.as_u16());
     assert!(status.contains(&204) && status.iter().all(|status| [204, 409].contains(status)), "{answers:?}");
-    let list = app.get("/v1/recordings").send().await.expect(StatusCode::OK);
+    let list = app.get("/v1/jobs").send().await.expect(StatusCode::OK);
     assert_eq!(list["items"].as_array().unwrap().len(), 1);
 }
 

@@ -78,7 +78,7 @@ async fn a_full_disk_keeps_what_had_arrived_of_an_upload_and_it_goes_on_when_the
     let service = Service::start(&data, &[("SUREFOOT_WORKERS", "0")]);
     let app = App::new(&service, service.admin_key.as_ref().unwrap());
     let session = app.session("P-1").await;
-    let content = recording(400, 0);
+    let content = recording(600, 0);
     assert!(content.len() > 8 << 20, "{} bytes fit", content.len());
     let upload = app.begin_upload(&session, content.len(), "application/json").await;
 

@@ -1,6 +1,6 @@
 //! Whose turn it is: short before long, nobody crowded out, and clocks that are set.
 
-use crate::support::Bench;
+use crate::support::{Bench, consent};
 use surefoot::assessment::Settings;
 use surefoot::queue::{Job, JobState, Queue, QueueSettings};
 use surefoot::storage::{Access, NewPatient, NewSession, Role, SessionId};
@@ -24,6 +24,7 @@ async fn stranger(bench: &Bench) -> (Access, SessionId) {
     let started_at = datetime!(2026-11-22 07:00 UTC);
     let session = NewSession { patient_id, started_at, protocol: None, notes: None, noise_model: None };
     let session = store.create_session(&access, &session).await.unwrap().id;
+    store.record_consent(&access, patient_id, &consent()).await.unwrap();
     (access, session)
 }
 

@@ -45,13 +45,7 @@ impl Bench {
         let access = client.access();
         let patient = NewPatient { pseudonym: "P-1".into(), ..NewPatient::default() };
         let patient = store.create_patient(&access, &patient).await.unwrap();
-        let consent = NewConsent {
-            scope: ConsentScope::Assessment,
-            text_version: "test".into(),
-            given_at: datetime!(2026-11-22 07:00 UTC),
-            expires_at: None,
-        };
-        store.record_consent(&access, patient.id, &consent).await.unwrap();
+        store.record_consent(&access, patient.id, &consent()).await.unwrap();
         let session = NewSession {
             patient_id: patient.id,
             started_at: datetime!(2026-11-22 07:00 UTC),
@@ -104,6 +98,16 @@ impl Bench {
     /// Lets the longest pause between two attempts, and every lease, pass.
     pub fn pass_time(&self) {
         self.clock.advance(time::Duration::minutes(10));
+    }
+}
+
+/// A consent that holds on the day of the tests, and long before.
+pub fn consent() -> NewConsent {
+    NewConsent {
+        scope: ConsentScope::Assessment,
+        text_version: "test".into(),
+        given_at: datetime!(2020-01-01 0:00 UTC),
+        expires_at: None,
     }
 }
 
