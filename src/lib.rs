@@ -24,7 +24,7 @@
 //! | [`evaluation`] | agreement with a reference |
 //! | [`fall_risk`] | rules with id, unit, citation |
 //! | [`report`] | what a clinician reads |
-//! | [`storage`] | SQLite rows, blobs of bytes |
+//! | [`storage`] | rows in SQLite or PostgreSQL, blobs of bytes |
 //! | [`queue`] | durable jobs |
 //! | [`worker`] | claim, load, assess, save |
 //! | [`api`] | HTTP, one file per resource |
