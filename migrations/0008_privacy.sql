@@ -41,6 +41,7 @@ CREATE INDEX audit_entries_by_time ON audit_entries (happened_at);
 
 CREATE TABLE audit_things (
     hash BLOB NOT NULL PRIMARY KEY CHECK (length(hash) = 32),
+    organisation_id BLOB NOT NULL,
     kind TEXT NOT NULL,
     id BLOB NOT NULL,
     patient BLOB

@@ -45,7 +45,8 @@ fn every_operation_has_a_name_a_summary_a_tag_and_documented_refusals() {
             assert!(statuses.iter().any(|status| *status == "401"), "{what}: needs a key and does not say so");
         }
         for (status, response) in operation["responses"].as_object().expect("responses") {
-            if status.starts_with(['4', '5']) {
+            // An answer to HEAD has no body.
+            if status.starts_with(['4', '5']) && method != "head" {
                 assert!(response["content"]["application/problem+json"].is_object(), "{what} {status}");
             }
         }

@@ -41,6 +41,7 @@ CREATE INDEX audit_entries_by_time ON audit_entries (happened_at);
 
 CREATE TABLE audit_things (
     hash BYTEA NOT NULL PRIMARY KEY CHECK (length(hash) = 32),
+    organisation_id UUID NOT NULL,
     kind TEXT NOT NULL,
     id UUID NOT NULL,
     patient BYTEA

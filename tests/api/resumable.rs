@@ -196,8 +196,9 @@ async fn a_defect_is_told_with_its_code_and_place() {
     assert!(text(&problem["errors"][0]["path"]).starts_with("joints"), "{problem:#}");
     assert_eq!(text(&read(&app, &upload).await["problem"]["code"]), "unknown_joint");
 
-    let zip = begin(&app, &app.session_of("P-2").await, 21, &[]).await;
-    patch(&app, zip.header("location"), 0, "PK\u{3}\u{4} this is a zip.").send().await.refused(422, "not_a_recording");
+    let zip = "PK\u{3}\u{4} this is a zip.";
+    let begun = begin(&app, &app.session_of("P-2").await, zip.len(), &[]).await;
+    patch(&app, begun.header("location"), 0, zip).send().await.refused(422, "not_a_recording");
 }
 
 #[tokio::test]

@@ -149,8 +149,14 @@ pub(crate) async fn append(
     let mut previous = Hash::from_bytes(state.try_get("hash")?)?;
     for event in events {
         sequence += 1;
-        let thing = known(&mut *connection, secret, event.thing).await?;
-        let made = known(&mut *connection, secret, event.made).await?;
+        // A request that failed may name what its sender must not know of: not even whose it is, or that it is there.
+        let (thing, made) = match event.status < 400 {
+            true => {
+                let thing = known(&mut *connection, secret, event.thing).await?;
+                (thing, known(&mut *connection, secret, event.made).await?)
+            }
+            false => (event.thing.map(|thing| unknown(secret.hash(thing), thing)), None),
+        };
         let of_thing = |known: &Option<KnownThing>| known.as_ref().and_then(|known| known.patient);
         let patient = of_thing(&thing).or_else(|| of_thing(&made));
         let kind = |thing: Option<Thing>| thing.map_or("", |thing| thing.kind.name());
@@ -236,48 +242,50 @@ async fn known(
         let patient: Option<&[u8]> = row.try_get("patient")?;
         return Ok(Some(KnownThing { hash, patient: patient.map(Hash::from_bytes).transpose()? }));
     }
-    let found: Option<Option<Uuid>> =
-        query(owner_question(thing.kind)).bind(thing.id).fetch_optional_value(&mut *connection).await?;
-    let of_patient = |id| secret.hash(Thing { kind: ThingKind::Patient, id });
-    let patient = match (found, thing.kind) {
-        (Some(owner), _) => owner.map(of_patient),
-        // Entries about a patient who is gone, or never was, are found by the id too.
-        (None, ThingKind::Patient) => Some(hash),
-        (None, _) => None,
-    };
-    if found.is_some() {
-        query(
-            "INSERT INTO audit_things (hash, kind, id, patient) VALUES ($1, $2, $3, $4) ON CONFLICT (hash) DO NOTHING",
-        )
-        .bind(&hash.0[..])
-        .bind(thing.kind.name())
-        .bind(thing.id)
-        .bind(patient.as_ref().map(|hash| &hash.0[..]))
-        .execute(connection)
-        .await?;
-    }
+    let found = query(owner_question(thing.kind)).bind(thing.id).fetch_optional(&mut *connection).await?;
+    let Some(owner) = found else { return Ok(Some(unknown(hash, thing))) };
+    let organisation: OrganisationId = owner.try_get("organisation_id")?;
+    let patient: Option<Uuid> = owner.try_get("patient_id")?;
+    let patient = patient.map(|id| secret.hash(Thing { kind: ThingKind::Patient, id }));
+    query(
+        "INSERT INTO audit_things (hash, organisation_id, kind, id, patient) VALUES ($1, $2, $3, $4, $5)
+         ON CONFLICT (hash) DO NOTHING",
+    )
+    .bind(&hash.0[..])
+    .bind(organisation)
+    .bind(thing.kind.name())
+    .bind(thing.id)
+    .bind(patient.as_ref().map(|hash| &hash.0[..]))
+    .execute(connection)
+    .await?;
     Ok(Some(KnownThing { hash, patient }))
+}
+
+/// A thing of which nothing is known. Entries about a patient who is gone, or never was, are found by the id too.
+fn unknown(hash: Hash, thing: Thing) -> KnownThing {
+    KnownThing { hash, patient: (thing.kind == ThingKind::Patient).then_some(hash) }
 }
 
 /// Whose a thing is: a row when there is such a thing, with the patient when it is a patient's.
 fn owner_question(kind: ThingKind) -> &'static str {
     match kind {
-        ThingKind::Patient => "SELECT id FROM patients WHERE id = $1",
-        ThingKind::Session => "SELECT patient_id FROM sessions WHERE id = $1",
+        ThingKind::Patient => "SELECT organisation_id, id AS patient_id FROM patients WHERE id = $1",
+        ThingKind::Session => "SELECT organisation_id, patient_id FROM sessions WHERE id = $1",
         ThingKind::Recording => {
-            "SELECT s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id WHERE r.id = $1"
+            "SELECT r.organisation_id, s.patient_id FROM recordings r JOIN sessions s ON s.id = r.session_id
+             WHERE r.id = $1"
         }
         ThingKind::Job => {
-            "SELECT s.patient_id FROM jobs j JOIN recordings r ON r.id = j.recording_id
+            "SELECT j.organisation_id, s.patient_id FROM jobs j JOIN recordings r ON r.id = j.recording_id
                   JOIN sessions s ON s.id = r.session_id WHERE j.id = $1"
         }
         ThingKind::Assessment => {
-            "SELECT s.patient_id FROM assessments a JOIN recordings r ON r.id = a.recording_id
+            "SELECT a.organisation_id, s.patient_id FROM assessments a JOIN recordings r ON r.id = a.recording_id
                   JOIN sessions s ON s.id = r.session_id WHERE a.id = $1"
         }
-        ThingKind::Measure => "SELECT patient_id FROM measures WHERE id = $1",
-        ThingKind::NoiseModel => "SELECT NULL AS patient_id FROM noise_models WHERE id = $1",
-        ThingKind::Client => "SELECT NULL AS patient_id FROM clients WHERE id = $1",
+        ThingKind::Measure => "SELECT organisation_id, patient_id FROM measures WHERE id = $1",
+        ThingKind::NoiseModel => "SELECT organisation_id, NULL AS patient_id FROM noise_models WHERE id = $1",
+        ThingKind::Client => "SELECT organisation_id, NULL AS patient_id FROM clients WHERE id = $1",
     }
 }
 

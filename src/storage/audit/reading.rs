@@ -150,8 +150,10 @@ impl Store {
             ($patient:literal) => {
                 concat!(
                     "SELECT e.*, t.id AS thing_id, m.id AS made_id, p.id AS patient_id
-                     FROM audit_entries e LEFT JOIN audit_things t ON t.hash = e.thing
-                          LEFT JOIN audit_things m ON m.hash = e.made LEFT JOIN audit_things p ON p.hash = e.patient
+                     FROM audit_entries e
+                          LEFT JOIN audit_things t ON t.hash = e.thing AND t.organisation_id = $1
+                          LEFT JOIN audit_things m ON m.hash = e.made AND m.organisation_id = $1
+                          LEFT JOIN audit_things p ON p.hash = e.patient AND p.organisation_id = $1
                      WHERE e.organisation_id = $1 AND e.sequence < $2
                        AND ($4 IS NULL OR e.actor_id = $4)
                        AND ($5 IS NULL OR e.happened_at >= $5)

@@ -5,6 +5,7 @@ use super::bones::{LegPart, LegPoints, PART_COUNT, PELVIS, RestLeg, part_index};
 use super::noise::smoothstep;
 use nalgebra::{Matrix4, Point3};
 use std::collections::HashMap;
+use std::panic::catch_unwind;
 
 /// A file that is not the figure.
 #[derive(Debug, thiserror::Error)]
@@ -12,6 +13,9 @@ pub enum FigureError {
     /// The file is no binary glTF.
     #[error("not a binary glTF file: {0}")]
     Gltf(#[from] gltf::Error),
+    /// The file is damaged.
+    #[error("the binary glTF file is damaged")]
+    Damaged,
     /// Something that the figure has is missing.
     #[error("the file has no {0}: it is not CesiumMan.glb")]
     Missing(&'static str),
@@ -39,6 +43,11 @@ const SOLE_SHARE: f64 = 0.25;
 /// # Errors
 /// [`FigureError`] when the bytes are not that figure.
 pub fn body_from_glb(bytes: &[u8]) -> Result<Body, FigureError> {
+    // The parser panics at some damaged files: at a length that is less than its own, at indices that lead nowhere.
+    catch_unwind(|| parse(bytes)).unwrap_or(Err(FigureError::Damaged))
+}
+
+fn parse(bytes: &[u8]) -> Result<Body, FigureError> {
     let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(bytes)?;
     let buffer = |_: gltf::Buffer<'_>| blob.as_deref();
     let skin = document.skins().next().ok_or(FigureError::Missing("skin"))?;
