@@ -72,6 +72,7 @@ from surefoot_client import Client
 address, key, path = sys.argv[1:]
 client = Client(address, key)
 patient = client.create_patient(body={'pseudonym': 'P-1'})
+client.record_consent(id=patient['id'], body={'scope': 'assessment', 'text_version': 'test'})
 session = client.create_session(body={'patient_id': patient['id']})['id']
 upload = client.begin_upload(session, path)
 with open(path, 'rb') as file:

@@ -277,7 +277,10 @@ async fn every_operation_holds_the_walls_that_the_document_names() {
         if has_own_id || names_patient || operation.id == "create_session" {
             match operation.method {
                 Method::HEAD => assert_eq!(answer.status, StatusCode::NOT_FOUND, "{what}"),
-                _ => drop(answer.refused(404, "not_found")),
+                _ => {
+                    assert_eq!(answer.status, StatusCode::NOT_FOUND, "{what}: {answer:?}");
+                    drop(answer.refused(404, "not_found"));
+                }
             }
             absent += 1;
         } else if operation.id == "create_noise_model" {

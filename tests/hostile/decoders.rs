@@ -18,6 +18,8 @@ use surefoot::synthetic::walker::{Course, WalkerSettings, WalkerSimulation, cesi
 /// One reader of bytes.
 pub struct Decoder {
     pub name: &'static str,
+    /// It gets so many times fewer inputs than the quick ones.
+    pub cost: u64,
     pub shape: Shape,
     /// Whether the bytes were accepted.
     pub read: fn(&[u8]) -> bool,
@@ -26,13 +28,13 @@ pub struct Decoder {
 }
 
 pub const DECODERS: &[Decoder] = &[
-    Decoder { name: "mcap", shape: Shape::Mcap, read: read_mcap, seeds: mcap_seeds },
-    Decoder { name: "json", shape: Shape::Text, read: read_json, seeds: json_seeds },
-    Decoder { name: "depth_mcap", shape: Shape::Mcap, read: read_depth, seeds: depth_seeds },
-    Decoder { name: "raw_depth", shape: Shape::Bytes, read: read_raw_depth, seeds: raw_depth_seeds },
-    Decoder { name: "camera_file", shape: Shape::Text, read: read_camera_file, seeds: camera_file_seeds },
-    Decoder { name: "gltf", shape: Shape::Bytes, read: read_gltf, seeds: gltf_seeds },
-    Decoder { name: "request_bodies", shape: Shape::Text, read: read_bodies, seeds: body_seeds },
+    Decoder { name: "mcap", cost: 1, shape: Shape::Mcap, read: read_mcap, seeds: mcap_seeds },
+    Decoder { name: "json", cost: 1, shape: Shape::Text, read: read_json, seeds: json_seeds },
+    Decoder { name: "depth_mcap", cost: 100, shape: Shape::Mcap, read: read_depth, seeds: depth_seeds },
+    Decoder { name: "raw_depth", cost: 1, shape: Shape::Bytes, read: read_raw_depth, seeds: raw_depth_seeds },
+    Decoder { name: "camera_file", cost: 1, shape: Shape::Text, read: read_camera_file, seeds: camera_file_seeds },
+    Decoder { name: "gltf", cost: 1, shape: Shape::Bytes, read: read_gltf, seeds: gltf_seeds },
+    Decoder { name: "request_bodies", cost: 1, shape: Shape::Text, read: read_bodies, seeds: body_seeds },
 ];
 
 /// Small limits: what is to be found is found in small inputs.

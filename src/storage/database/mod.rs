@@ -49,7 +49,7 @@ impl Database {
     /// halfway because another writer was faster.
     pub(crate) async fn begin(&self) -> Result<Transaction, StorageError> {
         Ok(match self {
-            Self::Sqlite { writer, .. } => Transaction::Sqlite(writer.begin_with("BEGIN IMMEDIATE").await?),
+            Self::Sqlite { writer, .. } => Transaction::Sqlite(sqlite::begin(writer).await?),
             #[cfg(feature = "scaleout")]
             Self::Postgres(pool) => Transaction::Postgres(pool.begin().await?),
         })

@@ -3,6 +3,7 @@
 use super::Database;
 use crate::storage::{StorageError, maintenance};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::{Sqlite, SqlitePool, Transaction};
 use std::path::Path;
 use std::time::Duration;
 
@@ -31,6 +32,19 @@ pub(super) async fn open(path: &Path) -> Result<Database, StorageError> {
     maintenance::clean_once(&writer).await?;
     let readers = pool().max_connections(READERS).connect_with(options.pragma("query_only", "ON")).await?;
     Ok(Database::Sqlite { writer, readers })
+}
+
+/// Begins to write. A connection whose last transaction could neither be committed nor rolled back, as on a disk that was full, is
+/// of no use any more: it gives way to a new one.
+pub(super) async fn begin(writer: &SqlitePool) -> Result<Transaction<'static, Sqlite>, sqlx::Error> {
+    const STATEMENT: &str = "BEGIN IMMEDIATE";
+    match writer.begin_with(STATEMENT).await {
+        Err(sqlx::Error::InvalidSavePointStatement) => {
+            writer.acquire().await?.close().await?;
+            writer.begin_with(STATEMENT).await
+        }
+        begun => begun,
+    }
 }
 
 #[cfg(test)]
