@@ -57,6 +57,13 @@ async fn read(app: &TestApp, upload: &str) -> Value {
     app.get(upload).send().await.expect(StatusCode::OK)
 }
 
+/// How many recordings there are in the session of an upload.
+async fn n_recordings(app: &TestApp, upload: &str) -> usize {
+    let session = text(&read(app, upload).await["session_id"]).to_owned();
+    let list = app.get(&format!("/v1/sessions/{session}/recordings")).send().await.expect(StatusCode::OK);
+    list["items"].as_array().unwrap().len()
+}
+
 fn files(app: &TestApp) -> usize {
     std::fs::read_dir(app.folder.path().join("resumable")).map_or(0, Iterator::count)
 }
@@ -182,7 +189,7 @@ async fn another_digest_at_the_end_is_refused_and_stays_refused() {
     let head = tus(&app, Method::HEAD, &upload).open().await;
     assert_eq!(head.status(), StatusCode::UNPROCESSABLE_ENTITY);
     assert_eq!((files(&app), app.stored_uploads().await), (0, 0), "a file stayed");
-    assert_eq!(app.get("/v1/jobs").send().await.expect(StatusCode::OK)["items"], json!([]));
+    assert_eq!(n_recordings(&app, &upload).await, 0);
 }
 
 #[tokio::test]
@@ -196,9 +203,9 @@ async fn a_defect_is_told_with_its_code_and_place() {
     assert!(text(&problem["errors"][0]["path"]).starts_with("joints"), "{problem:#}");
     assert_eq!(text(&read(&app, &upload).await["problem"]["code"]), "unknown_joint");
 
-    let zip = "PK\u{3}\u{4} this is a zip.";
-    let begun = begin(&app, &app.session_of("P-2").await, zip.len(), &[]).await;
-    patch(&app, begun.header("location"), 0, zip).send().await.refused(422, "not_a_recording");
+    let archive = "PK\u{3}\u{4} this is an archive";
+    let upload = begin(&app, &app.session_of("P-2").await, archive.len(), &[]).await;
+    patch(&app, upload.header("location"), 0, archive).send().await.refused(422, "not_a_recording");
 }
 
 #[tokio::test]
@@ -212,8 +219,7 @@ async fn whoever_missed_the_answer_to_the_last_byte_asks_again() {
         look_after(&app.state).await.unwrap();
     }
     patch(&app, &upload, 0, bytes).send().await.refused(409, "offset_mismatch");
-    let list = app.get("/v1/jobs").send().await.expect(StatusCode::OK);
-    assert_eq!(list["items"].as_array().unwrap().len(), 1);
+    assert_eq!(n_recordings(&app, &upload).await, 1);
 }
 
 #[tokio::test]
@@ -230,8 +236,7 @@ async fn an_upload_whose_service_died_after_the_last_byte_is_finished() {
     look_after(&app.state).await.unwrap();
     look_after(&app.state).await.unwrap();
     assert_eq!(text(&read(&app, &upload).await["state"]), "stored");
-    let list = app.get("/v1/jobs").send().await.expect(StatusCode::OK);
-    assert_eq!(list["items"].as_array().unwrap().len(), 1);
+    assert_eq!(n_recordings(&app, &upload).await, 1);
     assert_eq!(files(&app), 0);
 }
 
@@ -244,8 +249,7 @@ async fn two_who_bring_the_last_bytes_at_once_make_one_recording() {
     let answers = futures::join!(bring(), bring(), bring());
     let status = [&answers.0, &answers.1, &answers.2].map(|answer| answer.status.as_u16());
     assert!(status.contains(&204) && status.iter().all(|status| [204, 409].contains(status)), "{answers:?}");
-    let list = app.get("/v1/jobs").send().await.expect(StatusCode::OK);
-    assert_eq!(list["items"].as_array().unwrap().len(), 1);
+    assert_eq!(n_recordings(&app, &upload).await, 1);
 }
 
 #[tokio::test]

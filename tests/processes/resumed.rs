@@ -74,7 +74,7 @@ async fn an_upload_survives_clients_and_services_that_end_at_any_byte() {
     let id = stored["recording_id"].as_str().unwrap();
     let kept = app.get_bytes(&format!("/v1/recordings/{id}/content")).await;
     assert!(kept == content, "the bytes that are stored are those that were sent");
-    assert_eq!(app.list("/v1/jobs").await.len(), 1);
+    assert_eq!(app.list(&format!("/v1/sessions/{session}/recordings")).await.len(), 1);
     assert_eq!(app.list("/v1/jobs").await.len(), 1);
     assert_eq!(std::fs::read_dir(data.join("resumable")).unwrap().count(), 0, "the file became the blob");
     println!("{} bytes, {cuts} connections cut, {kills} services killed (seed {seed})", content.len());
@@ -110,5 +110,5 @@ async fn a_service_that_is_killed_while_the_last_byte_is_worked_off_stores_one_r
         assert_eq!(app.continue_upload(upload, offset, content[offset..].to_vec()).await, Some(204));
         assert_eq!(app.get(upload).await["state"], "stored");
     }
-    assert_eq!(app.list("/v1/jobs").await.len(), uploads.len());
+    assert_eq!(app.list(&format!("/v1/sessions/{session}/recordings")).await.len(), uploads.len());
 }

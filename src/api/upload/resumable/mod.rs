@@ -278,10 +278,14 @@ async fn read_upload(
             ("Upload-Length" = u64, description = "Bytes of the whole recording"),
             ("Upload-Metadata" = String, description = "What the client said of it, until the last byte has arrived"),
             ("Upload-Expires" = String, description = "When what has arrived is given up, unless more comes"))),
-        (status = 410, description = "Nothing came for too long; what had arrived was given up"),
-        (status = 412, description = "The version of the protocol is not known here"),
-        (status = 422, description = "The recording was refused; GET says why"),
-        (status = 423, description = "Another request is busy with this upload")))]
+        (status = 410, description = "Nothing came for too long; what had arrived was given up", body = Problem,
+            content_type = "application/problem+json"),
+        (status = 412, description = "The version of the protocol is not known here", body = Problem,
+            content_type = "application/problem+json"),
+        (status = 422, description = "The recording was refused; GET says why", body = Problem,
+            content_type = "application/problem+json"),
+        (status = 423, description = "Another request is busy with this upload", body = Problem,
+            content_type = "application/problem+json")))]
 async fn read_upload_offset(
     State(state): State<AppState>,
     caller: Caller,
@@ -359,8 +363,12 @@ async fn continue_upload(
     let has_checksum = headers.contains_key(CHECKSUM);
     let added = tokio::spawn(async move { add(&state, &caller, upload, asked, has_checksum, body).await });
     let upload = added.await.map_err(ApiError::internal)??;
-    let headers = [(OFFSET, upload.received_bytes.to_string()), (EXPIRES, http_date(upload.expires_at)?)];
-    Ok((StatusCode::NO_CONTENT, headers).into_response())
+    let offset = [(OFFSET, upload.received_bytes.to_string())];
+    if upload.state == ResumableState::Stored {
+        return Ok((StatusCode::NO_CONTENT, offset).into_response());
+    }
+    let expires = [(EXPIRES, http_date(upload.expires_at)?)];
+    Ok((StatusCode::NO_CONTENT, offset, expires).into_response())
 }
 
 async fn add(
