@@ -109,11 +109,12 @@ fn started(data: &std::path::Path) -> (Service, String, String) {
     let arguments = ["serve", "--json", "--listen", "127.0.0.1:0", "--data-dir"];
     let mut service = Command::new(env!("CARGO_BIN_EXE_surefoot"));
     let service = service.args(arguments).arg(data).stdout(Stdio::piped()).stderr(Stdio::null());
-    let mut service = Service(service.spawn().unwrap());
+    let mut service = Service(service.spawn().expect("the binary starts"));
     let mut started = String::new();
-    BufReader::new(service.0.stdout.take().unwrap()).read_line(&mut started).unwrap();
-    let started: serde_json::Value = serde_json::from_str(&started).unwrap();
-    let [address, key] = [&started["address"], &started["admin_key"]].map(|value| value.as_str().unwrap().to_owned());
+    BufReader::new(service.0.stdout.take().expect("a pipe")).read_line(&mut started).expect("a line");
+    let started: serde_json::Value = serde_json::from_str(&started).expect("JSON");
+    let [address, key] =
+        [&started["address"], &started["admin_key"]].map(|value| value.as_str().expect("text").to_owned());
     (service, address, key)
 }
 
