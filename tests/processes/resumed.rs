@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// A request that breaks off: it announces all of `rest`, and its connection ends after `n` bytes of it.
 fn break_off(service: &Service, key: &str, upload: &str, offset: usize, rest: &[u8], n: usize) {
-    let host = service.address.strip_prefix("http://").unwrap();
+    let host = service.address.strip_prefix("http://").expect("an address of HTTP");
     let Ok(mut line) = TcpStream::connect(host) else { return };
     let head = format!(
         "PATCH {upload} HTTP/1.1\r\nHost: {host}\r\nAuthorization: Bearer {key}\r\nTus-Resumable: 1.0.0\r\n\
