@@ -100,12 +100,12 @@ impl App {
     /// Every item of a list, over all of its pages.
     pub async fn list(&self, path: &str) -> Vec<Value> {
         let separator = if path.contains('?') { '&' } else { '?' };
-        let (mut items, mut cursor) = (Vec::new(), String::new());
+        let (mut items, mut address) = (Vec::new(), format!("{path}{separator}limit=200"));
         loop {
-            let page = self.get(&format!("{path}{separator}limit=200{cursor}")).await;
+            let page = self.get(&address).await;
             items.extend(page["items"].as_array().expect("items").iter().cloned());
             match page["next"].as_str() {
-                Some(next) => cursor = format!("&cursor={next}"),
+                Some(next) => next.clone_into(&mut address),
                 None => return items,
             }
         }
