@@ -94,5 +94,7 @@ check() {
     tail -n 40 "$work/log" >&2
     exit 1
 }
-check schemathesis.toml
-check schemathesis-rows.toml --phases examples,coverage,fuzzing --include-path-regex '\{id\}'
+# It cannot make bodies of `application/offset+octet-stream`; tests/api/resumable.rs does.
+check schemathesis.toml --exclude-operation-id continue_upload
+# The rows stay, and what begins an upload has parameters of its own.
+check schemathesis-rows.toml --exclude-operation-id erase_patient --exclude-operation-id create_upload --phases examples,coverage,fuzzing --include-path-regex '\{id\}'
