@@ -102,7 +102,7 @@ pub async fn run(args: &Args) -> anyhow::Result<()> {
 
 /// A clinician's key of the demo's own; a data directory may be used again.
 async fn demo_key(config: &Config) -> anyhow::Result<String> {
-    let store = serve::open_store(&config).await?;
+    let store = serve::open_store(config).await?;
     store.ensure_first_admin().await?;
     let organisations = store.organisations().await?;
     let organisation = organisations.first().context("the data directory has no organisation")?;

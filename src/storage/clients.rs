@@ -277,7 +277,7 @@ impl Store {
             .bind(ms_from_time(now))
             .execute(&mut transaction)
             .await?;
-        Ok(transaction.commit().await?)
+        transaction.commit().await
     }
 
     /// The holders of keys of the organisation, oldest first, revoked ones too; users are others' question.

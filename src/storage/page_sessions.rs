@@ -129,7 +129,7 @@ impl Store {
             .bind(&token.digest()[..])
             .execute(&mut transaction)
             .await?;
-        Ok(transaction.commit().await?)
+        transaction.commit().await
     }
 }
 

@@ -142,7 +142,7 @@ impl Store {
                 tracing::warn!(event = "sign_in_locked", kind, failures, wait_s, "sign-ins have to wait");
             }
         }
-        Ok(transaction.commit().await?)
+        transaction.commit().await
     }
 
     /// Forgets the failures of a name: somebody has signed in with it, or it was reset.
@@ -155,7 +155,7 @@ impl Store {
             .bind(&Concerned::Name(name).digest()[..])
             .execute(&mut transaction)
             .await?;
-        Ok(transaction.commit().await?)
+        transaction.commit().await
     }
 }
 

@@ -24,9 +24,10 @@ const SEED: u64 = 7;
 /// # Errors
 /// Names the pipeline that got its recording wrong, and how.
 pub fn sing() -> Result<(), String> {
-    let canaries: [(&str, fn() -> Result<(), String>); 3] =
-        [("joint_angles", joint_angles), ("skeleton_fusion", skeleton_fusion), ("leg_pose", leg_pose)];
-    canaries.into_iter().try_for_each(|(pipeline, canary)| canary().map_err(|why| format!("{pipeline}: {why}")))
+    let of = |pipeline: &'static str| move |why: String| format!("{pipeline}: {why}");
+    joint_angles().map_err(of("joint_angles"))?;
+    skeleton_fusion().map_err(of("skeleton_fusion"))?;
+    leg_pose().map_err(of("leg_pose"))
 }
 
 fn joint_angles() -> Result<(), String> {

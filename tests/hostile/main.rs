@@ -4,6 +4,8 @@
 //! under `found/DECODER/` and tried first. `SUREFOOT_FUZZ_INPUTS` sets how many inputs each decoder gets, `SUREFOOT_SEED` which.
 //! The long run: `SUREFOOT_FUZZ_INPUTS=1700000 cargo test --release --test hostile -- --nocapture --test-threads 1`
 
+#![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
+
 mod decoders;
 mod mutation;
 

@@ -1,5 +1,7 @@
 //! Real processes of the binary, killed, starved and set against each other.
 
+#![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
+
 mod disk_full;
 mod kills;
 mod load;

@@ -94,20 +94,22 @@ pub(crate) enum Transaction {
 impl Transaction {
     /// Makes what was done last.
     pub(crate) async fn commit(self) -> Result<(), StorageError> {
-        Ok(match self {
+        match self {
             Self::Sqlite(transaction) => transaction.commit().await?,
             #[cfg(feature = "scaleout")]
             Self::Postgres(transaction) => transaction.commit().await?,
-        })
+        }
+        Ok(())
     }
 
     /// Leaves nothing of what was done.
     pub(crate) async fn rollback(self) -> Result<(), StorageError> {
-        Ok(match self {
+        match self {
             Self::Sqlite(transaction) => transaction.rollback().await?,
             #[cfg(feature = "scaleout")]
             Self::Postgres(transaction) => transaction.rollback().await?,
-        })
+        }
+        Ok(())
     }
 
     /// Waits until no other transaction holds the same `subject`, and holds it to the end. SQLite's transactions are alone

@@ -225,7 +225,7 @@ impl Store {
         .execute(&mut transaction)
         .await?;
         end_sessions(&mut transaction, user).await?;
-        Ok(transaction.commit().await?)
+        transaction.commit().await
     }
 
     /// Takes a user out of use, at once, and ends what the user was signed in to. Doing it again changes nothing.
