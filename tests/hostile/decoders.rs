@@ -108,7 +108,7 @@ fn read_depth(bytes: &[u8]) -> bool {
         }
     }
     // A few are assessed too: what is accepted must not make the tracker fail.
-    if bytes.len() % 64 == 0
+    if bytes.len().is_multiple_of(64)
         && let Ok(reader) = DepthReader::open(bytes, &limits())
     {
         let _ = surefoot::pipeline::leg_pose::assess(reader, &LegPoseSettings::default(), &Monitor::default());
