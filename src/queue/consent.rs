@@ -109,7 +109,7 @@ async fn end_jobs_of_patient(
             continue;
         }
         query(
-            "UPDATE jobs SET state = 'cancelled', cancel_requested = 1, due_at = NULL, finished_at = $2 WHERE id = $1",
+            "UPDATE jobs SET state = 'cancelled', cancel_requested = TRUE, due_at = NULL, finished_at = $2 WHERE id = $1",
         )
         .bind(id)
         .bind(ms_from_time(now))

@@ -84,7 +84,7 @@ impl Store {
     /// When the database fails.
     pub async fn client_of_page_session(&self, token: &PageToken) -> Result<Option<Client>, StorageError> {
         let Some(client) = self.client_behind_page_session(token).await? else { return Ok(None) };
-        let waits: i64 = query("SELECT count(*) FROM users WHERE id = $1 AND must_change_password = 1")
+        let waits: i64 = query("SELECT count(*) FROM users WHERE id = $1 AND must_change_password")
             .bind(client.id)
             .fetch_value(self.reader())
             .await?;

@@ -286,6 +286,9 @@ mod tests {
     #[tokio::test]
     async fn the_bytes_of_an_assessed_recording_go_in_time_and_its_results_stay() {
         let clinic = Clinic::open().await;
+        if clinic.rows_are_elsewhere() {
+            return;
+        }
         let waiting = clinic.insert_recording(&clinic.admin, clinic.session).await.unwrap();
         assessed(&clinic, waiting.id, Some(0)).await;
         let done = clinic.insert_recording(&clinic.admin, clinic.session).await.unwrap();
@@ -307,6 +310,9 @@ mod tests {
     #[tokio::test]
     async fn the_last_recording_takes_the_bytes_with_it() {
         let clinic = Clinic::open().await;
+        if clinic.rows_are_elsewhere() {
+            return;
+        }
         let recording = clinic.insert_recording(&clinic.admin, clinic.session).await.unwrap();
         assessed(&clinic, recording.id, None).await;
         clinic.clock.advance(Duration::days(31));

@@ -94,9 +94,9 @@ pub(super) async fn remove(connection: &mut Transaction, patient: PatientId) -> 
 async fn blobs(connection: &mut Transaction, patient: PatientId) -> Result<Vec<ErasedBlob>, StorageError> {
     let rows = query(
         "SELECT DISTINCT r.sha256, r.size_bytes,
-                CASE WHEN EXISTS (SELECT 1 FROM recordings o JOIN sessions t ON t.id = o.session_id
+                CAST(CASE WHEN EXISTS (SELECT 1 FROM recordings o JOIN sessions t ON t.id = o.session_id
                                   WHERE o.blob_key = r.blob_key AND o.content_removed_at IS NULL AND t.patient_id <> $1)
-                     THEN 1 ELSE 0 END AS is_shared
+                     THEN 1 ELSE 0 END AS BIGINT) AS is_shared
          FROM recordings r JOIN sessions s ON s.id = r.session_id
          WHERE s.patient_id = $1 AND r.content_removed_at IS NULL ORDER BY r.sha256",
     )
