@@ -131,6 +131,9 @@ async fn nothing_of_an_erased_patient_is_left_in_any_file() {
 #[tokio::test]
 async fn bytes_that_another_patient_has_too_stay() {
     let clinic = Clinic::open().await;
+    if clinic.rows_are_elsewhere() {
+        return;
+    }
     let other = NewPatient { pseudonym: "P-2".into(), ..NewPatient::default() };
     let other = clinic.store.create_patient(&clinic.admin, &other).await.unwrap().id;
     let session = NewSession {
