@@ -5,7 +5,7 @@ use super::{ClientId, OrganisationId};
 /// Whose rows a question may touch. Every question of a client carries one, and every answer stays inside.
 ///
 /// Reading questions about one patient also reach what another organisation has shared with the client: they say so by the condition
-/// [`shared_with`]. A question without that condition, and so every one that writes, ends at the organisation's walls.
+/// `shared_with`. A question without that condition, and so every one that writes, ends at the organisation's walls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Access {
     /// The client's own organisation.
@@ -29,7 +29,7 @@ impl Access {
         Self { reaches_shared: false, ..self }
     }
 
-    /// The client to whom patients may be shared, bound in the condition [`shared_with`] before the time; none reaches nothing.
+    /// The client to whom patients may be shared, bound in the condition `shared_with` before the time; none reaches nothing.
     pub(crate) fn receiver(&self) -> Option<ClientId> {
         self.reaches_shared.then_some(self.client)
     }

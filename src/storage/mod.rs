@@ -1,7 +1,7 @@
 //! Rows and blobs of bytes: SQLite and a folder, or PostgreSQL and a bucket.
 //!
 //! Every question that is asked of the database is one method of [`Store`], in the file of its subject, with domain
-//! types in and out: whoever asks never sees SQL, and [`database`] puts SQLite or PostgreSQL behind the same questions.
+//! types in and out: whoever asks never sees SQL, and `database` puts SQLite or PostgreSQL behind the same questions.
 //!
 //! A question by a client takes an [`Access`]. What lies outside of it does not exist for the client: the answer is
 //! [`StorageError::NotFound`], never "forbidden", so that nobody learns of another organisation's rows.

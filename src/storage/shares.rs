@@ -1,5 +1,5 @@
 //! One patient, readable to one clinician of another organisation until a time. The condition by which a question reaches what is
-//! shared is [`super::access::shared_with`].
+//! shared is `access::shared_with`.
 
 use super::clock::ms_from_time;
 use super::database::{Row, query};

@@ -1,7 +1,7 @@
 //! Bearer tokens of an identity provider (OpenID Connect; access tokens as RFC 9068 has them), in place of a key.
 //!
 //! A token counts when its signature is of a pinned algorithm and of a key of the issuer, when it is of the configured issuer and for the
-//! configured audience, and when its time is right to [`LEEWAY_S`]. Then its claims say the organisation and the role; its user is made
+//! configured audience, and when its time is right to `LEEWAY_S`. Then its claims say the organisation and the role; its user is made
 //! known when the first token comes. What a token does not say, nobody is given.
 
 mod claims;

@@ -1,6 +1,6 @@
 //! The audit log: who did or read what, when, and with what outcome. Rows are only ever added, and each carries the hash of the
 //! one before, so that a row that was changed, removed or slipped in later is found by whoever walks the chain
-//! ([`Store::verify_audit`]).
+//! (`Store::verify_audit`).
 //!
 //! An entry holds no pseudonym, note or value, and no id of a patient's things either: those stand in it as keyed hashes
 //! (HMAC-SHA-256), because entries stay when the patient is erased. `audit_things` says which id a hash stands for; an

@@ -5,7 +5,7 @@
 //! 3. The hash of the patient's id goes into the list of erasures, a file beside the database, so that a backup from before can
 //!    be rid of the patient when it is restored.
 //! 4. Blobs that no other recording names are removed.
-//! 5. The database file and its log are rid of remnants ([`Store::purge_remnants`]).
+//! 5. The database file and its log are rid of remnants (`Store::purge_remnants`).
 //!
 //! A crash after the first step leaves a record that is not done; [`Store::resume_erasures`] goes on with it. The record knows the
 //! patient by a keyed hash only. A worker that computes meanwhile finds no job any more when it comes back.
