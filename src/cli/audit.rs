@@ -1,6 +1,6 @@
 //! `surefoot audit`: the audit log of a data directory checked and written out.
 
-use super::backup::Whose;
+use super::place::Place;
 use crate::api::audit::AuditEntryResponse;
 use crate::storage::audit::{Hash, Verification};
 use anyhow::{Context, bail};
@@ -27,7 +27,7 @@ enum AuditCommand {
     /// log that was written anew from some entry on is found too.
     Verify {
         #[command(flatten)]
-        whose: Whose,
+        place: Place,
         /// A head that was printed earlier
         #[arg(long, value_name = "NUMBER:HASH")]
         known: Option<Head>,
@@ -38,7 +38,7 @@ enum AuditCommand {
     /// Write entries to the standard output, one JSON object a line, oldest first
     Export {
         #[command(flatten)]
-        whose: Whose,
+        place: Place,
         /// Number of the first entry wanted
         #[arg(long, value_name = "NUMBER", default_value_t = 1)]
         from: i64,
@@ -66,14 +66,14 @@ impl FromStr for Head {
 /// When the chain is broken, or the data directory cannot be opened.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
     match &args.command {
-        AuditCommand::Verify { whose, known, json } => {
-            let store = whose.store().await?;
+        AuditCommand::Verify { place, known, json } => {
+            let store = place.open_existing().await?;
             let found = store.verify_audit(known.map(|Head(sequence, hash)| (sequence, hash))).await?;
             store.close().await;
             told(&found, *json)
         }
-        AuditCommand::Export { whose, from } => {
-            let store = whose.store().await?;
+        AuditCommand::Export { place, from } => {
+            let store = place.open_existing().await?;
             let mut out = std::io::BufWriter::new(std::io::stdout().lock());
             let mut entries = store.audit_from(*from);
             while let Some(entry) = entries.try_next().await? {

@@ -1,44 +1,9 @@
 //! `surefoot backup`, `restore` and `doctor`: the data directory copied, brought back, examined.
 
-use super::serve;
-use crate::config::Config;
+use super::place::Place;
 use crate::storage::{self, Store};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
-
-/// Which data directory is meant.
-#[derive(Debug, Clone, clap::Args)]
-pub(super) struct Whose {
-    /// Data directory; default: as `surefoot serve` would choose
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
-    /// Configuration file; default: `surefoot.toml` when it exists
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-}
-
-impl Whose {
-    pub(super) fn data_dir(&self) -> anyhow::Result<PathBuf> {
-        match &self.data_dir {
-            Some(folder) => Ok(folder.clone()),
-            None => Ok(self.configuration()?.data_dir),
-        }
-    }
-
-    /// What `surefoot serve` would go by.
-    pub(super) fn configuration(&self) -> anyhow::Result<Config> {
-        serve::load_config(self.config.as_deref())
-    }
-
-    /// The store of a directory that is one already: a look must not make one.
-    pub(super) async fn store(&self) -> anyhow::Result<Store> {
-        let folder = self.data_dir()?;
-        if !folder.is_dir() {
-            bail!("there is no data directory {}; name it with --data-dir", folder.display());
-        }
-        Store::open(&folder).await.with_context(|| format!("cannot open the data directory {}", folder.display()))
-    }
-}
 
 /// Copy the data directory into a new folder, also while the service runs
 ///
@@ -50,7 +15,7 @@ pub struct BackupArgs {
     /// Folder of the copy; made when absent, and must be empty
     folder: PathBuf,
     #[command(flatten)]
-    whose: Whose,
+    place: Place,
 }
 
 /// Make a data directory from a backup
@@ -65,7 +30,7 @@ pub struct RestoreArgs {
     /// Folder that `surefoot backup` wrote
     backup: PathBuf,
     #[command(flatten)]
-    whose: Whose,
+    place: Place,
     #[command(flatten)]
     erased: Erased,
 }
@@ -88,7 +53,7 @@ struct Erased {
 #[derive(Debug, Clone, clap::Args)]
 pub struct DoctorArgs {
     #[command(flatten)]
-    whose: Whose,
+    place: Place,
     /// Look whether recordings are there, without reading them
     #[arg(long)]
     quick: bool,
@@ -102,7 +67,7 @@ pub struct DoctorArgs {
 /// # Errors
 /// When the folder is not empty, the disk is full, or a recording is missing or damaged.
 pub async fn back_up(args: &BackupArgs) -> anyhow::Result<()> {
-    let store = args.whose.store().await?;
+    let store = args.place.open_existing().await?;
     let manifest = store.back_up(&args.folder).await?;
     store.close().await;
     let (n, bytes) = (manifest.blobs.len(), manifest.total_bytes());
@@ -115,7 +80,7 @@ pub async fn back_up(args: &BackupArgs) -> anyhow::Result<()> {
 /// # Errors
 /// When the folder is no backup or is damaged, or the data directory is not empty.
 pub async fn restore(args: &RestoreArgs) -> anyhow::Result<()> {
-    let data_dir = args.whose.data_dir()?;
+    let data_dir = args.place.configuration()?.data_dir;
     if let Some(list) = &args.erased.erasures
         && !list.is_file()
     {
@@ -151,7 +116,7 @@ pub async fn restore(args: &RestoreArgs) -> anyhow::Result<()> {
 /// # Errors
 /// When something in the data directory is damaged, or it cannot be opened.
 pub async fn examine(args: &DoctorArgs) -> anyhow::Result<()> {
-    let store = args.whose.store().await?;
+    let store = args.place.open_existing().await?;
     let found = store.ailments(!args.quick).await?;
     store.close().await;
     if args.json {

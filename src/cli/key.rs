@@ -1,9 +1,8 @@
 //! `surefoot key`: API keys, made and revoked at the machine itself.
 
-use super::serve;
+use super::place::Place;
 use crate::storage::{ApiKey, Client, ClientId, OrganisationId, Role, Rotation, StorageError, Store};
 use anyhow::bail;
-use std::path::PathBuf;
 use time::{Duration, OffsetDateTime};
 use uuid::Uuid;
 
@@ -13,12 +12,8 @@ use uuid::Uuid;
 /// only its digest is stored.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {
-    /// Data directory; default: as `surefoot serve` would choose.
-    #[arg(long, global = true, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
-    /// Configuration file; default: `surefoot.toml` when it exists.
-    #[arg(long, global = true, value_name = "FILE")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
     /// Print JSON, for programs.
     #[arg(long, global = true)]
     json: bool,
@@ -88,11 +83,7 @@ impl From<RoleName> for Role {
 /// # Errors
 /// When the data directory cannot be opened or the request contradicts what is stored.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
-    let mut config = serve::load_config(args.config.as_deref())?;
-    if let Some(data_dir) = &args.data_dir {
-        config.data_dir.clone_from(data_dir);
-    }
-    let store = serve::open_store(&config).await?;
+    let store = args.place.open().await?;
     let result = match &args.action {
         Action::Create { role, label, organisation, expires_in_days } => {
             let expires_at = end_after(&store, *expires_in_days);

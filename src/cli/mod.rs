@@ -15,6 +15,7 @@ mod noise_model;
 pub mod openapi;
 mod overlay;
 pub mod patient;
+mod place;
 pub mod retention;
 pub mod serve;
 pub mod simulate;

@@ -1,6 +1,6 @@
 //! `surefoot patient`: everything about one patient, at the machine.
 
-use super::backup::Whose;
+use super::place::Place;
 use crate::api::auth::Caller;
 use crate::api::patient_export::archive_of;
 use crate::queue::{Queue, QueueSettings};
@@ -34,7 +34,7 @@ enum PatientCommand {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
         #[command(flatten)]
-        whose: Whose,
+        place: Place,
     },
 }
 
@@ -43,8 +43,8 @@ enum PatientCommand {
 /// # Errors
 /// When there is no such patient, or the archive cannot be written.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
-    let PatientCommand::Export { id, out, whose } = &args.command;
-    let (store, patient) = (whose.store().await?, PatientId(*id));
+    let PatientCommand::Export { id, out, place } = &args.command;
+    let (store, patient) = (place.open_existing().await?, PatientId(*id));
     let organisation = store.organisation_of_patient(patient).await.context("nothing was exported")?;
     let event = AuditEvent::of_command(
         store.now(),

@@ -1,6 +1,6 @@
 //! `surefoot retention`: what the rules of retention take away, said or done.
 
-use super::backup::Whose;
+use super::place::Place;
 use crate::storage::audit::Actor;
 use crate::storage::retention::RetentionRules;
 
@@ -12,7 +12,7 @@ use crate::storage::retention::RetentionRules;
 #[command(after_help = "Example:\n  surefoot retention --dry-run --config /etc/surefoot.toml")]
 pub struct Args {
     #[command(flatten)]
-    whose: Whose,
+    place: Place,
     /// Say what would be removed, and remove nothing
     #[arg(long)]
     dry_run: bool,
@@ -26,8 +26,8 @@ pub struct Args {
 /// # Errors
 /// When the data directory cannot be opened, or something cannot be removed.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
-    let rules = RetentionRules::from(&args.whose.configuration()?);
-    let store = args.whose.store().await?;
+    let rules = RetentionRules::from(&args.place.configuration()?);
+    let store = args.place.open_existing().await?;
     if args.dry_run {
         let plan = store.retention_plan(&rules).await?;
         store.close().await;

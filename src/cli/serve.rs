@@ -1,6 +1,7 @@
 //! `surefoot serve`: the service on one machine.
 
 use super::housekeeping;
+use super::place::Place;
 use crate::api::AppState;
 use crate::api::upload::resumable;
 use crate::config::Config;
@@ -14,7 +15,7 @@ use crate::worker;
 use anyhow::Context;
 use std::collections::HashMap;
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
@@ -36,12 +37,8 @@ const METRICS_UPKEEP: Duration = Duration::from_secs(5);
 /// in an orderly way; jobs that run are taken up again by the next start.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Args {
-    /// Configuration file in TOML; default: `surefoot.toml` when it exists.
-    #[arg(long, value_name = "FILE")]
-    pub config: Option<PathBuf>,
-    /// Directory of the database and the recordings; made when absent.
-    #[arg(long, value_name = "DIR")]
-    pub data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
     /// Address to listen on; port 0 chooses a free one.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
@@ -62,10 +59,7 @@ impl Args {
     /// # Errors
     /// When a source cannot be read or holds a value that does not fit.
     pub fn config(&self) -> anyhow::Result<Config> {
-        let mut config = load_config(self.config.as_deref())?;
-        if let Some(data_dir) = &self.data_dir {
-            config.data_dir.clone_from(data_dir);
-        }
+        let mut config = self.place.configuration()?;
         config.listen = self.listen.unwrap_or(config.listen);
         config.workers = self.workers.unwrap_or(config.workers);
         config.max_recording_bytes = self.max_recording_bytes.unwrap_or(config.max_recording_bytes);

@@ -1,11 +1,10 @@
 //! `surefoot user`: people who sign in to the pages, made and disabled at the machine itself.
 
 use super::key::organisation_for;
-use super::serve;
+use super::place::Place;
 use crate::storage::users::is_user_name;
 use crate::storage::{ClientId, NewUser, OrganisationId, Password, Role, StorageError, Store, User};
-use anyhow::{Context, bail};
-use std::path::PathBuf;
+use anyhow::bail;
 
 /// Make, list, reset and disable users of the pages
 ///
@@ -13,12 +12,8 @@ use std::path::PathBuf;
 /// it at the next sign-in.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {
-    /// Data directory; default: as `surefoot serve` would choose.
-    #[arg(long, global = true, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
-    /// Configuration file; default: `surefoot.toml` when it exists.
-    #[arg(long, global = true, value_name = "FILE")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
     /// Print JSON, for programs.
     #[arg(long, global = true)]
     json: bool,
@@ -67,13 +62,7 @@ enum UserRoleName {
 /// # Errors
 /// When the data directory cannot be opened or the request contradicts what is stored.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
-    let mut config = serve::load_config(args.config.as_deref())?;
-    if let Some(data_dir) = &args.data_dir {
-        config.data_dir.clone_from(data_dir);
-    }
-    let store = Store::open(&config.data_dir)
-        .await
-        .with_context(|| format!("cannot open the data directory {}", config.data_dir.display()))?;
+    let store = args.place.open().await?;
     let result = act(&store, args).await;
     store.close().await;
     result

@@ -1,5 +1,6 @@
 //! `surefoot worker`: the workers alone, beside the service or on another machine.
 
+use super::place::Place;
 use super::serve::{self, ended};
 use crate::api::metrics;
 use crate::worker;
@@ -7,7 +8,6 @@ use anyhow::{Context, bail};
 use axum::Router;
 use axum::routing::get;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
@@ -24,12 +24,8 @@ const GRACE: Duration = Duration::from_secs(20);
 /// orderly way: what it holds goes back to the queue.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Args {
-    /// Configuration file in TOML; default: `surefoot.toml` when it exists.
-    #[arg(long, value_name = "FILE")]
-    pub config: Option<PathBuf>,
-    /// Directory of the database and the recordings, or of the parts of uploads when these are elsewhere.
-    #[arg(long, value_name = "DIR")]
-    pub data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    place: Place,
     /// Jobs that run at the same time.
     #[arg(long, value_name = "N")]
     pub workers: Option<usize>,
@@ -43,10 +39,7 @@ pub struct Args {
 /// # Errors
 /// When the queue cannot be reached, or the address is taken.
 pub async fn run(args: &Args) -> anyhow::Result<()> {
-    let mut config = serve::load_config(args.config.as_deref())?;
-    if let Some(data_dir) = &args.data_dir {
-        config.data_dir.clone_from(data_dir);
-    }
+    let mut config = args.place.configuration()?;
     config.workers = args.workers.unwrap_or(config.workers).max(1);
     let stop = CancellationToken::new();
     let store = serve::open_store(&config).await?;

@@ -7,6 +7,8 @@ mod assessments;
 mod audit;
 mod authorisation;
 mod clients;
+#[path = "../common/mod.rs"]
+mod common;
 mod consents;
 mod crowd;
 mod erasures;

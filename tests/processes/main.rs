@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "all of this crate is tests; helpers of tests fail by panic too")]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod disk_full;
 mod kills;
 mod load;

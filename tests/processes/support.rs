@@ -1,14 +1,13 @@
 //! The binary as a process, and a home app that does not give up.
 
+use crate::common::standing;
 use base64::Engine;
-use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use surefoot::body::Joint;
-use surefoot::recording::{Header, Recording, SkeletonRecording, encode};
+use surefoot::recording::encode;
 
 /// Time for a service to start, and for a queue to be worked off.
 pub const PATIENCE: Duration = Duration::from_secs(900);
@@ -176,32 +175,5 @@ impl App {
 
 /// A JSON recording of a person who sways, `seconds` long at 30 frames a second; another for every `version`.
 pub fn recording(seconds: usize, version: usize) -> Vec<u8> {
-    let at = |x: f64, y: f64| Vector3::new(x, y, 2.0);
-    let posture = [
-        (Joint::Head, at(0.0, 0.75)),
-        (Joint::Torso, at(0.0, 0.25)),
-        (Joint::LeftShoulder, at(0.2, 0.5)),
-        (Joint::RightShoulder, at(-0.2, 0.5)),
-        (Joint::LeftElbow, at(0.45, 0.5)),
-        (Joint::RightElbow, at(-0.45, 0.5)),
-        (Joint::LeftHand, at(0.7, 0.5)),
-        (Joint::RightHand, at(-0.7, 0.5)),
-        (Joint::LeftHip, at(0.1, 0.0)),
-        (Joint::RightHip, at(-0.1, 0.0)),
-        (Joint::LeftKnee, at(0.1, -0.4)),
-        (Joint::RightKnee, at(-0.1, -0.4)),
-        (Joint::LeftFoot, at(0.1, -0.8)),
-        (Joint::RightFoot, at(-0.1, -0.8)),
-    ];
-    let n = 30 * seconds;
-    let sway = |t: usize| Vector3::new(0.005 * (t as f64 * (0.1 + 0.01 * version as f64)).sin(), 0.0, 0.0);
-    let skeleton = SkeletonRecording {
-        joints: posture.iter().map(|(joint, _)| *joint).collect(),
-        time_ns: (0..n as i64).map(|t| t * 33_333_333).collect(),
-        positions: (0..n).flat_map(|t| posture.map(|(_, position)| position + sway(t))).collect(),
-        confidence: vec![1.0; n * posture.len()],
-        orientations: Vec::new(),
-    };
-    let header = Header { protocol: Some("standing".into()), ..Header::default() };
-    encode::json(&Recording { header, skeleton: Some(skeleton), inertial: None, references: Vec::new() }).expect("JSON")
+    encode::json(&standing(30 * seconds, 0.1 + 0.01 * version as f64)).expect("JSON")
 }

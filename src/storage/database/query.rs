@@ -1,7 +1,6 @@
 //! A question on its way to the database.
 
 use super::{Bind, Column, Database, Row, Transaction, Value};
-use crate::storage::StorageError;
 use futures::stream::BoxStream;
 use futures::{StreamExt, TryStreamExt};
 use sqlx::{Sqlite, SqliteConnection, SqlitePool};
@@ -178,10 +177,10 @@ impl<'q> Query<'q> {
     }
 
     /// The first column of an answer that has one row.
-    pub(crate) async fn fetch_value<'c, T>(self, on: impl Into<Executor<'c>>) -> Result<T, StorageError>
+    pub(crate) async fn fetch_value<'c, T>(self, on: impl Into<Executor<'c>>) -> Result<T, sqlx::Error>
     where
         T: for<'r> Column<'r>,
     {
-        Ok(self.fetch_one(on).await?.first()?)
+        self.fetch_one(on).await?.first()
     }
 }
