@@ -24,7 +24,7 @@ def main():
         small = work / "small.mcap"
         simulate(binary, small, 10)
         service = Service(binary, work / "data")
-        session = service.new_session("P-1")
+        _, session = service.new_session("P-1")
         n = max(1, round(gigabytes * 1e9 / RECORDING_BYTES))
         for i in range(n):
             large = work / "large.mcap"

@@ -13,18 +13,18 @@ use crate::storage::{Access, StorageError};
 use std::time::Duration;
 
 /// Computation of any job, whatever it assesses.
-const BASE_MS: u32 = 200;
+const BASE_MS: u32 = 50;
 /// Shortest and longest time after which somebody who was sent away is asked to come again.
 const SHORTEST_WAIT: Duration = Duration::from_secs(5);
 const LONGEST_WAIT: Duration = Duration::from_secs(600);
 
 /// The expected computation of a job: milliseconds of any, and of every megabyte of its recording. A guess that only the order
-/// rests on; docs/scaling.md has measured costs.
+/// rests on, after the costs of the default methods in docs/scaling.md.
 pub(super) fn expected_cost(settings: &Settings) -> (u32, u32) {
     let per_megabyte = match settings {
-        Settings::JointAngles(_) => 200,
-        Settings::SkeletonFusion(_) => 100,
-        Settings::LegPose(_) => 150,
+        Settings::JointAngles(_) => 100,
+        Settings::SkeletonFusion(_) => 60,
+        Settings::LegPose(_) => 60,
         Settings::NoiseModel(_) => 2000,
     };
     (BASE_MS, per_megabyte)
