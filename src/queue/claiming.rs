@@ -1,6 +1,6 @@
 //! Out of the queue, for a while: claims, leases, heartbeats.
 
-use super::job::job_from_row;
+use super::job::{JOB_FORMAT, job_from_row};
 use super::{Job, JobError, Queue, WORKER_LOST};
 use crate::progress::Progress;
 use crate::storage::clock::ms_from_time;
@@ -20,7 +20,7 @@ pub enum Renewal {
 }
 
 impl Queue {
-    /// Takes the due job whose turn it is, counts the attempt and starts its lease; `None` when none is due.
+    /// Takes the due job whose turn it is and that this version can do, counts the attempt and starts its lease; `None` when none is due.
     ///
     /// # Errors
     /// When the database fails.
@@ -35,7 +35,7 @@ impl Queue {
                     "UPDATE jobs SET state = 'running', attempt = attempt + 1, worker = $1, due_at = $2, started_at = $3,
                                      progress_step = 'waiting', progress_done = 0, progress_total = 0
                      WHERE id = (SELECT id FROM jobs
-                                 WHERE due_at IS NOT NULL AND (due_at <= $3 OR due_at > $4)
+                                 WHERE due_at IS NOT NULL AND (due_at <= $3 OR due_at > $4) AND format <= $5
                                  ORDER BY turn_at, id LIMIT 1",
                     $lock,
                     ") RETURNING id"
@@ -50,6 +50,7 @@ impl Queue {
         .bind(ms_from_time(now + self.settings.lease))
         .bind(ms_from_time(now))
         .bind(ms_from_time(now + self.settings.furthest_due()))
+        .bind(JOB_FORMAT)
         .fetch_optional_value(&mut transaction)
         .await?;
         let Some(id) = claimed else {

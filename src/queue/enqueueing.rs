@@ -1,6 +1,6 @@
 //! Into the queue.
 
-use super::job::job_from_row;
+use super::job::{JOB_FORMAT, job_from_row};
 use super::turn::expected_cost;
 use super::{Job, Queue};
 use crate::assessment::Settings;
@@ -141,8 +141,8 @@ impl Queue {
         let (base_ms, ms_per_megabyte) = expected_cost(settings);
         let inserted = query(
             "INSERT INTO jobs (id, organisation_id, recording_id, state, max_attempts, due_at, settings, queued_at,
-                               expected_ms, turn_at)
-             SELECT $1, one.organisation_id, one.id, 'queued', $5, $6, $7, $6, one.expected_ms,
+                               format, expected_ms, turn_at)
+             SELECT $1, one.organisation_id, one.id, 'queued', $5, $6, $7, $6, $10, one.expected_ms,
                     $6 + one.expected_ms
                        + (SELECT CAST(coalesce(sum(w.expected_ms), 0) AS BIGINT) FROM jobs w
                           WHERE w.organisation_id = one.organisation_id AND w.state = 'queued'
@@ -160,6 +160,7 @@ impl Queue {
         .bind(row::readable_json("the settings", settings)?)
         .bind(base_ms)
         .bind(ms_per_megabyte)
+        .bind(JOB_FORMAT)
         .execute(&mut *connection)
         .await?;
         if inserted == 0 {

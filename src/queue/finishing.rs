@@ -3,9 +3,12 @@
 use super::{JobError, JobState, Queue};
 use crate::assessment::{Assessment, NoiseModel};
 use crate::storage::assessments::{self, EncodedAssessment};
+use crate::storage::audit::{Actor, AuditEvent, Thing, ThingKind};
 use crate::storage::clock::ms_from_time;
 use crate::storage::database::{Transaction, query};
-use crate::storage::{Access, AssessmentId, JobId, NoiseModelId, RecordingId, StorageError, noise_models, row};
+use crate::storage::{
+    Access, AssessmentId, JobId, NoiseModelId, OrganisationId, RecordingId, StorageError, noise_models, row,
+};
 use time::OffsetDateTime;
 use tokio::task::spawn_blocking;
 
@@ -52,9 +55,10 @@ impl Queue {
             .map_err(|panic| StorageError::Corrupt(format!("coding an assessment failed: {panic}")))??;
         let now = self.store.now();
         let mut transaction = self.store.begin().await?;
-        let recording = end_as_done(&mut transaction, id, attempt, now).await?;
-        let Some(recording) = recording else { return Ok(Finish::Lost) };
-        let assessment = assessments::insert(&mut transaction, recording, id, &encoded, now).await?;
+        let Some(ended) = end_as_done(&mut transaction, id, attempt, now).await? else { return Ok(Finish::Lost) };
+        let assessment = assessments::insert(&mut transaction, ended.recording, id, &encoded, now).await?;
+        let made = Thing { kind: ThingKind::Assessment, id: assessment.0 };
+        self.store.audit_within(&mut transaction, ended.event("assessment", made, now)).await?;
         transaction.commit().await?;
         self.announce(id);
         Ok(Finish::Saved(assessment))
@@ -68,10 +72,10 @@ impl Queue {
     pub async fn finish_training(&self, id: JobId, attempt: u32, model: NoiseModel) -> Result<Trained, StorageError> {
         let now = self.store.now();
         let mut transaction = self.store.begin().await?;
-        if end_as_done(&mut transaction, id, attempt, now).await?.is_none() {
-            return Ok(Trained::Lost);
-        }
+        let Some(ended) = end_as_done(&mut transaction, id, attempt, now).await? else { return Ok(Trained::Lost) };
         let model = noise_models::insert(&mut transaction, id, model, now).await?;
+        let made = Thing { kind: ThingKind::NoiseModel, id: model.0 };
+        self.store.audit_within(&mut transaction, ended.event("training", made, now)).await?;
         transaction.commit().await?;
         self.announce(id);
         Ok(Trained::Saved(model))
@@ -171,23 +175,40 @@ impl Queue {
     }
 }
 
-/// Ends an attempt with its result, which the caller writes in the same transaction; the job's recording, or `None` when
-/// the job was no longer the worker's.
+/// A job whose result is being written.
+struct Ended {
+    recording: RecordingId,
+    organisation: OrganisationId,
+}
+
+impl Ended {
+    /// What the audit log says of it: the service made a result of the recording.
+    fn event(&self, action: &str, made: Thing, now: OffsetDateTime) -> AuditEvent {
+        let recording = Thing { kind: ThingKind::Recording, id: self.recording.0 };
+        let actor = Actor::service(Some(self.organisation));
+        let event = AuditEvent::of_command(now, actor, action, Some(recording), String::new());
+        AuditEvent { made: Some(made), ..event }
+    }
+}
+
+/// Ends an attempt with its result, which the caller writes in the same transaction; `None` when the job was no longer the
+/// worker's.
 async fn end_as_done(
     connection: &mut Transaction,
     id: JobId,
     attempt: u32,
     now: OffsetDateTime,
-) -> Result<Option<RecordingId>, StorageError> {
-    let recording = query(
+) -> Result<Option<Ended>, StorageError> {
+    let row = query(
         "UPDATE jobs SET state = 'done', due_at = NULL, finished_at = $3, error = NULL, progress_step = 'saving',
                          progress_done = 1, progress_total = 1
-         WHERE id = $1 AND attempt = $2 AND state = 'running' RETURNING recording_id",
+         WHERE id = $1 AND attempt = $2 AND state = 'running' RETURNING recording_id, organisation_id",
     )
     .bind(id)
     .bind(attempt)
     .bind(ms_from_time(now))
-    .fetch_optional_value(connection)
+    .fetch_optional(connection)
     .await?;
-    Ok(recording)
+    let Some(row) = row else { return Ok(None) };
+    Ok(Some(Ended { recording: row.try_get("recording_id")?, organisation: row.try_get("organisation_id")? }))
 }

@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 use time::OffsetDateTime;
 use utoipa::ToSchema;
 
+/// What a worker must understand to do a job. Raised when settings begin to say what workers of the version before cannot read:
+/// those leave such jobs to newer ones while a service is upgraded.
+pub(super) const JOB_FORMAT: u32 = 1;
+
 /// Where a job is in its life.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]

@@ -134,6 +134,30 @@ async fn a_store_opens_again_with_what_was_committed() {
 }
 
 #[tokio::test]
+async fn a_schema_that_a_newer_version_extended_is_used_while_it_reaches_back_and_refused_after() {
+    let clinic = Clinic::open().await;
+    let mut transaction = clinic.store.begin().await.unwrap();
+    query("ALTER TABLE sessions ADD COLUMN colour TEXT NOT NULL DEFAULT 'none'").execute(&mut transaction).await.unwrap();
+    query(
+        "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+         VALUES (9999, 'later', TRUE, $1, 0)",
+    )
+    .bind(&[0u8; 48][..])
+    .execute(&mut transaction)
+    .await
+    .unwrap();
+    transaction.commit().await.unwrap();
+    let store = clinic.reopen().await;
+    store.create_session(&clinic.admin, &new_session(clinic.patient)).await.unwrap();
+
+    let mut transaction = store.begin().await.unwrap();
+    query("UPDATE schema_reach SET oldest_migration = 9999").execute(&mut transaction).await.unwrap();
+    transaction.commit().await.unwrap();
+    let refused = Store::open_at(&clinic.places, Arc::new(clinic.clock.clone())).await;
+    assert!(matches!(refused, Err(StorageError::Conflict { code: "schema_too_new", .. })), "{refused:?}");
+}
+
+#[tokio::test]
 async fn the_first_start_makes_one_admin_and_shows_the_key_once() {
     let dir = tempfile::tempdir().unwrap();
     let store = Store::open(dir.path()).await.unwrap();

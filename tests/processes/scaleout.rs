@@ -4,6 +4,7 @@ use crate::servers::{Bucket, Nats, Postgres, holds_no_blob};
 use crate::support::{App, PATIENCE, Process, Service, number, recording, surefoot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use sqlx::{Connection, Executor, Row};
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -50,6 +51,10 @@ impl Installation {
         Service::start(&self.data(), &settings)
     }
 
+    fn several_workers(&self, n: u64) -> Vec<Process> {
+        (0..n).map(|_| self.worker(&[])).collect()
+    }
+
     fn worker(&self, more: &[(&str, &str)]) -> Process {
         worker(&self.data(), &self.settings, more)
     }
@@ -61,7 +66,7 @@ fn worker(data: &Path, settings: &[(String, String)], more: &[(&str, &str)]) -> 
     Process(command.spawn().unwrap())
 }
 
-/// `SUREFOOT_JOBS` sets how many, `SUREFOOT_PROCESSES` how many workers.
+/// `SUREFOOT_JOBS` sets how many, `SUREFOOT_PROCESSES` how many workers; with `SUREFOOT_CALM=1` nothing goes away.
 #[tokio::test(flavor = "multi_thread")]
 async fn every_job_has_one_result_whatever_goes_away_meanwhile() {
     let (n_jobs, n_workers, seed) =
@@ -72,11 +77,13 @@ async fn every_job_has_one_result_whatever_goes_away_meanwhile() {
     let key = service.admin_key.clone().expect("the first start");
     let app = App::new(&service, &key);
     let session = app.session("P-1").await;
-    let mut workers: Vec<Process> = (0..n_workers).map(|_| installation.worker(&[])).collect();
+    // A calm run measures how fast workers are; then all jobs wait for them.
+    let mut workers = if is_calm { Vec::new() } else { installation.several_workers(n_workers) };
 
     let content = recording(2, 0);
     let begun = Instant::now();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut n_killed = 0;
     let uploading = {
         let (app, session) = (app.clone(), session.clone());
         tokio::spawn(async move {
@@ -90,21 +97,31 @@ async fn every_job_has_one_result_whatever_goes_away_meanwhile() {
         })
     };
     if !is_calm {
-        for round in 0..8 {
-            tokio::time::sleep(Duration::from_millis(random.random_range(100..600))).await;
+        for round in 0.. {
+            if round >= 8 && round % 8 == 0 && uploading.is_finished() {
+                break;
+            }
+            // Thick and fast at first; in a long run now and then, so that it gets on.
+            let pause_ms = random.random_range(if round < 8 { 100..600 } else { 1000..5000 });
+            tokio::time::sleep(Duration::from_millis(pause_ms)).await;
             let victim = random.random_range(0..workers.len());
             workers[victim] = installation.worker(&[]);
-            match round {
+            match round % 8 {
                 2 => tokio::task::block_in_place(|| installation.nats.crash(Duration::from_millis(500))),
                 5 => tokio::task::block_in_place(|| installation.postgres.crash()),
                 _ => {}
             }
+            n_killed += 1;
         }
     }
     uploading.await.unwrap();
     let uploaded = begun.elapsed();
+    if is_calm {
+        workers = installation.several_workers(n_workers);
+    }
     app.until_all_jobs_are_over().await;
     let took = begun.elapsed();
+    drop(workers);
 
     let jobs = app.list("/v1/jobs").await;
     assert_eq!(jobs.len() as u64, n_jobs, "jobs");
@@ -120,12 +137,14 @@ async fn every_job_has_one_result_whatever_goes_away_meanwhile() {
     }
     let attempts: u64 = jobs.iter().map(|job| job["attempt"].as_u64().unwrap()).sum();
     println!(
-        "{n_jobs} jobs over {n_workers} workers (seed {seed}, calm {is_calm}): uploaded in {:.1} s, all done after {:.1} s \
-         ({:.1} jobs/s), {attempts} attempts, 0 lost, 0 doubled",
+        "{n_jobs} jobs over {n_workers} workers (seed {seed}): uploaded in {:.1} s, all done after {:.1} s, {n_killed} workers \
+         killed, {attempts} attempts, 0 lost, 0 doubled",
         uploaded.as_secs_f64(),
-        took.as_secs_f64(),
-        n_jobs as f64 / took.as_secs_f64()
+        took.as_secs_f64()
     );
+    if is_calm {
+        println!("worked off at {:.1} jobs/s", n_jobs as f64 / (took - uploaded).as_secs_f64());
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -167,4 +186,51 @@ async fn a_job_that_kills_its_workers_is_given_up_after_the_last_attempt() {
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
     assert_eq!(app.list("/v1/jobs?state=failed").await.len(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn old_processes_work_beside_new_ones_and_leave_them_what_they_do_not_understand() {
+    let Some(installation) = Installation::start() else { return };
+    let service = installation.service(&[]);
+    let key = service.admin_key.clone().unwrap();
+    let app = App::new(&service, &key);
+    let session = app.session("P-1").await;
+    let upload = async |name: &str| {
+        let (status, answer) = app.try_upload(&session, name, recording(2, 0)).await.unwrap();
+        assert_eq!(status, 202, "{answer:#}");
+        answer["job"]["id"].as_str().unwrap().to_owned()
+    };
+    let (first, second) = (upload("first").await, upload("second").await);
+    // What a newer version leaves behind: more columns, a migration that this one does not know, a job that it cannot read.
+    let mut connection = sqlx::PgConnection::connect(&installation.postgres.url()).await.unwrap();
+    for statement in [
+        "ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT 'none'",
+        "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+         VALUES (9999, 'later', TRUE, decode(repeat('00', 48), 'hex'), 0)",
+    ] {
+        connection.execute(statement).await.unwrap();
+    }
+    let set_first = async |connection: &mut sqlx::PgConnection, change: &str| {
+        let statement = format!("UPDATE jobs SET {change} WHERE id = '{first}'");
+        connection.execute(sqlx::AssertSqlSafe(statement)).await.unwrap();
+    };
+    set_first(&mut connection, "format = 9999, settings = '{\"pipeline\": \"unheard_of\"}'").await;
+
+    let _worker = installation.worker(&[]);
+    let is_done = async |app: &App, id: &str| {
+        let begun = Instant::now();
+        while app.get(&format!("/v1/jobs/{id}")).await["state"] != "done" {
+            assert!(begun.elapsed() < PATIENCE, "{id} is stuck");
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    is_done(&app, &second).await;
+    let row = sqlx::query("SELECT state, attempt FROM jobs WHERE format = 9999").fetch_one(&mut connection).await.unwrap();
+    assert_eq!((row.get::<&str, _>(0), row.get::<i64, _>(1)), ("queued", 0), "left to a newer worker");
+
+    // A process of this version that starts again, and one that understands the job.
+    drop(service);
+    let service = installation.service(&[]);
+    set_first(&mut connection, "format = 1, settings = (SELECT settings FROM jobs ORDER BY id DESC LIMIT 1)").await;
+    is_done(&App::new(&service, &key), &first).await;
 }

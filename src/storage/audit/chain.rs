@@ -304,6 +304,16 @@ impl Store {
         Ok(())
     }
 
+    /// Enters an event in a transaction, with what it tells of or not at all. It is the last question of the transaction: the end
+    /// of the chain is held until then.
+    pub(crate) async fn audit_within(
+        &self,
+        transaction: &mut Transaction,
+        event: AuditEvent,
+    ) -> Result<(), StorageError> {
+        append(transaction, &self.audit_secret, &[event]).await
+    }
+
     /// What stands for a thing in the audit log.
     pub fn audit_hash(&self, thing: Thing) -> Hash {
         self.audit_secret.hash(thing)

@@ -11,6 +11,7 @@
 mod postgres;
 mod query;
 mod row;
+mod schema;
 mod sqlite;
 mod value;
 

@@ -1,6 +1,6 @@
 //! A database of PostgreSQL.
 
-use super::Database;
+use super::{Database, schema};
 use crate::storage::StorageError;
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
 use std::str::FromStr;
@@ -21,6 +21,10 @@ pub(super) async fn connect(url: &str) -> Result<Database, StorageError> {
     let pool = PgPoolOptions::new().max_connections(CONNECTIONS).acquire_timeout(ACQUIRE_TIMEOUT);
     let pool = pool.connect_with(options).await?;
     // Processes that start together take turns: the migrator holds a lock of the server.
-    MIGRATIONS.run(&pool).await?;
+    if let Err(error) = MIGRATIONS.run(&pool).await {
+        // A database from before there was such a table reaches nowhere.
+        let reach = sqlx::query_scalar(schema::REACH).fetch_optional(&pool).await.unwrap_or_default();
+        schema::accept(error, &MIGRATIONS, reach)?;
+    }
     Ok(Database::Postgres(pool))
 }

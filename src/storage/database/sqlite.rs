@@ -1,6 +1,6 @@
 //! A file of SQLite.
 
-use super::Database;
+use super::{Database, schema};
 use crate::storage::{StorageError, maintenance};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{Sqlite, SqlitePool, Transaction};
@@ -28,7 +28,11 @@ pub(super) async fn open(path: &Path) -> Result<Database, StorageError> {
         .pragma("secure_delete", "ON");
     let pool = || SqlitePoolOptions::new().acquire_timeout(ACQUIRE_TIMEOUT).test_before_acquire(false);
     let writer = pool().max_connections(1).connect_with(options.clone()).await?;
-    MIGRATIONS.run(&writer).await?;
+    if let Err(error) = MIGRATIONS.run(&writer).await {
+        // A database from before there was such a table reaches nowhere.
+        let reach = sqlx::query_scalar(schema::REACH).fetch_optional(&writer).await.unwrap_or_default();
+        schema::accept(error, &MIGRATIONS, reach)?;
+    }
     maintenance::clean_once(&writer).await?;
     let readers = pool().max_connections(READERS).connect_with(options.pragma("query_only", "ON")).await?;
     Ok(Database::Sqlite { writer, readers })
