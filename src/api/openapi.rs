@@ -87,8 +87,8 @@ pub(super) fn complete(document: &OpenApi) -> Value {
     let mut document = serde_json::to_value(document).expect("a document of maps with text keys is always JSON");
     if let Some(paths) = document["paths"].as_object_mut() {
         for (path, item) in paths {
-            for operation in item.as_object_mut().into_iter().flat_map(|item| item.values_mut()) {
-                document_refusals(path, operation);
+            for (method, operation) in item.as_object_mut().into_iter().flatten() {
+                document_refusals(path, method, operation);
                 let parameters = operation.get_mut("parameters").and_then(Value::as_array_mut);
                 parameters.into_iter().flatten().for_each(absent_is_not_null);
             }
@@ -109,7 +109,7 @@ pub(super) fn complete(document: &OpenApi) -> Value {
 }
 
 /// What any handler of this kind may answer, when the handler's own words do not say it already.
-fn document_refusals(path: &str, operation: &mut Value) {
+fn document_refusals(path: &str, method: &str, operation: &mut Value) {
     let keyed = is_keyed(operation);
     // What watches the service is never limited.
     let limited = !path.starts_with("/health") && path != "/metrics";
@@ -127,6 +127,7 @@ fn document_refusals(path: &str, operation: &mut Value) {
         (429, "Too many requests; Retry-After says how many seconds to wait", limited),
         (500, "Our fault", true),
         (503, "The keys of the identity provider cannot be had", keyed),
+        (507, "There is no room left on the disk (`out_of_space`)", keyed && !["get", "head"].contains(&method)),
     ];
     let problem = json!({PROBLEM_JSON: {"schema": {"$ref": "#/components/schemas/Problem"}}});
     for (status, description, _) in refusals.into_iter().filter(|(_, _, applies)| *applies) {

@@ -137,7 +137,10 @@ async fn a_store_opens_again_with_what_was_committed() {
 async fn a_schema_that_a_newer_version_extended_is_used_while_it_reaches_back_and_refused_after() {
     let clinic = Clinic::open().await;
     let mut transaction = clinic.store.begin().await.unwrap();
-    query("ALTER TABLE sessions ADD COLUMN colour TEXT NOT NULL DEFAULT 'none'").execute(&mut transaction).await.unwrap();
+    query("ALTER TABLE sessions ADD COLUMN colour TEXT NOT NULL DEFAULT 'none'")
+        .execute(&mut transaction)
+        .await
+        .unwrap();
     query(
         "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
          VALUES (9999, 'later', TRUE, $1, 0)",

@@ -13,3 +13,5 @@ mod scaleout;
 #[cfg(feature = "scaleout")]
 mod servers;
 mod support;
+#[cfg(feature = "otel")]
+mod traces;

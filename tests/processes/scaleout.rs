@@ -201,6 +201,14 @@ async fn old_processes_work_beside_new_ones_and_leave_them_what_they_do_not_unde
         answer["job"]["id"].as_str().unwrap().to_owned()
     };
     let (first, second) = (upload("first").await, upload("second").await);
+    // Every connection of the service keeps this question prepared.
+    let ask_often = async || {
+        for _ in 0..40 {
+            app.get(&format!("/v1/jobs/{second}")).await;
+            app.get("/v1/jobs").await;
+        }
+    };
+    ask_often().await;
     // What a newer version leaves behind: more columns, a migration that this one does not know, a job that it cannot read.
     let mut connection = sqlx::PgConnection::connect(&installation.postgres.url()).await.unwrap();
     for statement in [
@@ -210,6 +218,7 @@ async fn old_processes_work_beside_new_ones_and_leave_them_what_they_do_not_unde
     ] {
         connection.execute(statement).await.unwrap();
     }
+    ask_often().await;
     let set_first = async |connection: &mut sqlx::PgConnection, change: &str| {
         let statement = format!("UPDATE jobs SET {change} WHERE id = '{first}'");
         connection.execute(sqlx::AssertSqlSafe(statement)).await.unwrap();
@@ -225,7 +234,8 @@ async fn old_processes_work_beside_new_ones_and_leave_them_what_they_do_not_unde
         }
     };
     is_done(&app, &second).await;
-    let row = sqlx::query("SELECT state, attempt FROM jobs WHERE format = 9999").fetch_one(&mut connection).await.unwrap();
+    let row =
+        sqlx::query("SELECT state, attempt FROM jobs WHERE format = 9999").fetch_one(&mut connection).await.unwrap();
     assert_eq!((row.get::<&str, _>(0), row.get::<i64, _>(1)), ("queued", 0), "left to a newer worker");
 
     // A process of this version that starts again, and one that understands the job.

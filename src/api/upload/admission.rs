@@ -1,11 +1,24 @@
 //! What an upload is asked before its bytes, and what its assessment is to be. Direct and resumable uploads ask the same.
 
-use crate::api::error::ApiError;
+use crate::api::error::{ApiError, Problem};
 use crate::api::noise_models::pinned;
 use crate::api::state::AppState;
 use crate::assessment::{JointAngleSettings, LegPoseSettings, Settings};
 use crate::recording::decode::Inspection;
 use crate::storage::{Access, Session, SessionId};
+
+/// What an upload may be answered, beside what every request may be, as the OpenAPI document tells it.
+#[derive(Debug, utoipa::IntoResponses)]
+#[expect(dead_code, reason = "read by the macro that documents an operation")]
+pub enum Refused {
+    /// Too many recordings of the organisation wait to be assessed (`too_many_waiting_jobs`), or too many requests; Retry-After
+    /// says how many seconds to wait
+    #[response(status = 429, content_type = "application/problem+json")]
+    TooManyOfOrganisation(#[to_schema] Problem),
+    /// Too many recordings wait to be assessed (`queue_full`), or the keys of the identity provider cannot be had
+    #[response(status = 503, content_type = "application/problem+json")]
+    QueueFull(#[to_schema] Problem),
+}
 
 /// The session, if a recording may be added to it: one of the caller's own organisation, whose patient has consented.
 ///

@@ -133,6 +133,7 @@ fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
 mod tests {
     use super::*;
     use axum::http::HeaderValue;
+    use proptest::prelude::*;
 
     /// SHA-256 of no bytes.
     const EMPTY_HEX: &str = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
@@ -184,5 +185,51 @@ mod tests {
         assert_eq!(format("application/vnd.surefoot.mcap").unwrap(), Some(Format::Mcap));
         assert_eq!(format("application/octet-stream").unwrap(), None);
         assert!(matches!(format("text/plain"), Err(ApiError::UnsupportedMediaType(_))));
+    }
+
+    const NAMES: [&str; 10] = [
+        "content-type",
+        "content-length",
+        "content-digest",
+        "x-content-sha256",
+        "idempotency-key",
+        "tus-resumable",
+        "upload-length",
+        "upload-offset",
+        "upload-metadata",
+        "upload-concat",
+    ];
+
+    /// Bytes, and what is nearly a header.
+    fn value() -> impl Strategy<Value = Vec<u8>> {
+        let text = |pattern: &str| prop::string::string_regex(pattern).unwrap().prop_map(String::into_bytes);
+        prop_oneof![
+            prop::collection::vec(any::<u8>(), 0..90),
+            text("(sha256|filetype|filename) ?[A-Za-z0-9+/]{0,90}={0,3}(,(sha256|filetype) [A-Za-z0-9+/=]{0,90})?"),
+            text("sha-(256|512)=?:?[A-Za-z0-9+/]{40,46}={0,2}:?(, ?sha-256=:[A-Za-z0-9+/]{43}=:)?"),
+            text("-?[0-9]{0,22}|1\\.0\\.0|[0-9a-fA-F]{63,65}|final;/v1/[a-z/ ]{0,9}|partial"),
+        ]
+    }
+
+    // The long run: PROPTEST_CASES=1000000 cargo test --release --lib announced
+    proptest! {
+        #[test]
+        fn no_header_is_too_strange_and_what_is_accepted_is_sound(
+            pairs in prop::collection::vec((prop::sample::select(&NAMES[..]), value()), 0..7),
+        ) {
+            let mut headers = HeaderMap::new();
+            for (name, value) in pairs {
+                if let Ok(value) = HeaderValue::from_bytes(&value) {
+                    headers.append(name, value);
+                }
+            }
+            let metadata = tus_protocol::Headers::from_headers(&headers).ok().and_then(|asked| asked.upload_metadata);
+            let resumed = metadata.and_then(|metadata| Announced::from_metadata(&metadata, 1).ok());
+            for announced in Announced::from_headers(&headers).into_iter().chain(resumed) {
+                let is_digest = |text: &String| text.len() == 64 && hex::decode(text).is_ok();
+                prop_assert!(announced.sha256.iter().all(is_digest), "{announced:?}");
+                prop_assert!(announced.idempotency_key.is_none_or(|key| (1..=128).contains(&key.len())));
+            }
+        }
     }
 }

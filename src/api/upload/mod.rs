@@ -18,7 +18,7 @@ use super::state::AppState;
 use crate::assessment::Settings;
 use crate::queue::{Job, Submission};
 use crate::storage::{ConsentState, NewRecording, SessionId, StoredRecording, StoredResponse};
-use admission::{admit, suited_settings};
+use admission::{Refused, admit, suited_settings};
 use announced::Announced;
 use arrival::Arrived;
 use axum::body::Body;
@@ -75,7 +75,8 @@ pub struct UploadResponse {
     responses((status = 202, description = "Stored; Location says where its job lives", body = UploadResponse,
                 headers(("Location" = String, description = "Address of the job"))),
               (status = 403, description = "The patient has not consented to assessment (`consent_required`), or the role of \
-                the key does not reach this far", body = super::error::Problem, content_type = "application/problem+json")))]
+                the key does not reach this far", body = super::error::Problem, content_type = "application/problem+json"),
+              Refused))]
 async fn upload_recording(
     State(state): State<AppState>,
     caller: Caller,

@@ -3,6 +3,7 @@
 use super::{Database, schema};
 use crate::storage::StorageError;
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
+use sqlx::{ConnectOptions, Connection};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -18,13 +19,20 @@ pub(super) async fn connect(url: &str) -> Result<Database, StorageError> {
     let options = PgConnectOptions::from_str(url)?
         .application_name("surefoot")
         .options([("synchronous_commit", "on"), ("default_transaction_isolation", "read committed")]);
+    migrate(&options).await?;
     let pool = PgPoolOptions::new().max_connections(CONNECTIONS).acquire_timeout(ACQUIRE_TIMEOUT);
-    let pool = pool.connect_with(options).await?;
-    // Processes that start together take turns: the migrator holds a lock of the server.
-    if let Err(error) = MIGRATIONS.run(&pool).await {
+    Ok(Database::Postgres(pool.connect_with(options).await?))
+}
+
+/// Processes that start together take turns: the migrator holds a lock of the server. It lets go of it at the end, but not when it
+/// has failed, so it has a connection of its own, with which the lock ends.
+async fn migrate(options: &PgConnectOptions) -> Result<(), StorageError> {
+    let mut connection = options.connect().await?;
+    if let Err(error) = MIGRATIONS.run(&mut connection).await {
         // A database from before there was such a table reaches nowhere.
-        let reach = sqlx::query_scalar(schema::REACH).fetch_optional(&pool).await.unwrap_or_default();
+        let reach = sqlx::query_scalar(schema::REACH).fetch_optional(&mut connection).await.unwrap_or_default();
         schema::accept(error, &MIGRATIONS, reach)?;
     }
-    Ok(Database::Postgres(pool))
+    connection.close().await?;
+    Ok(())
 }

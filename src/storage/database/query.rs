@@ -84,6 +84,13 @@ macro_rules! with_values {
     };
 }
 
+/// A question to PostgreSQL. One for all columns is not kept prepared: the plan would break when a newer version adds a column
+/// while this process runs.
+#[cfg(feature = "scaleout")]
+fn to_postgres<'q>(text: &'static str) -> sqlx::query::Query<'q, sqlx::Postgres, sqlx::postgres::PgArguments> {
+    sqlx::query(text).persistent(!text.contains('*'))
+}
+
 /// Asks the driver of the database at hand.
 macro_rules! ask {
     ($self:ident, $on:expr, $method:ident, $sqlite:expr, $postgres:expr) => {
@@ -95,15 +102,13 @@ macro_rules! ask {
                 $sqlite(with_values!(sqlx::query::<Sqlite>($self.text.sqlite), $self.values).$method(connection).await?)
             }
             #[cfg(feature = "scaleout")]
-            Executor::PostgresPool(pool) => $postgres(
-                with_values!(sqlx::query::<sqlx::Postgres>($self.text.postgres), $self.values).$method(pool).await?,
-            ),
+            Executor::PostgresPool(pool) => {
+                $postgres(with_values!(to_postgres($self.text.postgres), $self.values).$method(pool).await?)
+            }
             #[cfg(feature = "scaleout")]
-            Executor::Postgres(connection) => $postgres(
-                with_values!(sqlx::query::<sqlx::Postgres>($self.text.postgres), $self.values)
-                    .$method(connection)
-                    .await?,
-            ),
+            Executor::Postgres(connection) => {
+                $postgres(with_values!(to_postgres($self.text.postgres), $self.values).$method(connection).await?)
+            }
         }
     };
 }
@@ -143,7 +148,7 @@ impl<'q> Query<'q> {
             }
             #[cfg(feature = "scaleout")]
             Database::Postgres(pool) => {
-                let query = with_values!(sqlx::query::<sqlx::Postgres>(self.text.postgres), self.values);
+                let query = with_values!(to_postgres(self.text.postgres), self.values);
                 query.fetch(pool).map_ok(Row::Postgres).boxed()
             }
         }

@@ -15,7 +15,11 @@ pub(super) fn accept(error: MigrateError, known: &Migrator, reach: Option<i64>) 
     let MigrateError::VersionMissing(newer) = error else { return Err(error.into()) };
     let newest = known.iter().map(|migration| migration.version).max().unwrap_or(0);
     if reach.is_some_and(|oldest| oldest <= newest) {
-        tracing::warn!(newer, newest, "a newer version of surefoot has extended the database; this one works beside it");
+        tracing::warn!(
+            newer,
+            newest,
+            "a newer version of surefoot has extended the database; this one works beside it"
+        );
         return Ok(());
     }
     Err(StorageError::Conflict {

@@ -10,7 +10,7 @@ mod receiving;
 pub use finishing::{keep_in_order, look_after};
 pub use protocol::Transfers;
 
-use super::admission::admit;
+use super::admission::{Refused, admit};
 use super::announced::Announced;
 use super::arrival::limit;
 use crate::api::auth::Caller;
@@ -164,12 +164,7 @@ impl TryFrom<ResumableUpload> for ResumableUploadResponse {
             content_type = "application/problem+json"),
         (status = 415, description = "`filetype` is not accepted", body = Problem,
             content_type = "application/problem+json"),
-        (status = 429, description = "Too many recordings of the organisation wait to be assessed", body = Problem,
-            content_type = "application/problem+json"),
-        (status = 503, description = "Too many recordings wait to be assessed", body = Problem,
-            content_type = "application/problem+json"),
-        (status = 507, description = "There is no room left", body = Problem,
-            content_type = "application/problem+json")))]
+        Refused))]
 async fn create_upload(
     State(state): State<AppState>,
     caller: Caller,
