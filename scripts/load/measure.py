@@ -255,13 +255,14 @@ def padded(source, path, size):
     content = read(source)
     data_end = next(place - 9 for opcode, place, _ in records(content) if opcode == 0x0F)
     texts = b"".join(struct.pack("<I", len(text)) + text for text in (b"image", b"application/octet-stream"))
-    attachments = b""
+    attachments = bytearray()
     while len(content) + len(attachments) < size:
         fill = os.urandom(256 << 10)
         body = struct.pack("<QQ", 0, 0) + texts + struct.pack("<Q", len(fill)) + fill + struct.pack("<I", 0)
         attachments += struct.pack("<BQ", 0x09, len(body)) + body
     with open(path, "wb") as file:
-        file.write(content[:data_end] + attachments + content[data_end:])
+        # The check sum of the data section would be another; 0 says that there is none.
+        file.write(content[:data_end] + attachments + content[data_end : data_end + 9] + bytes(4) + content[data_end + 13 :])
     return path
 
 

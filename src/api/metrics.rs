@@ -22,6 +22,10 @@ pub const JOB_WAIT: &str = "surefoot_job_wait_seconds";
 pub const JOBS: &str = "surefoot_jobs";
 /// Expected computation of the jobs that wait, seconds: what to scale workers on.
 pub const EXPECTED: &str = "surefoot_queue_expected_seconds";
+/// Resumable uploads of which bytes are missing.
+pub const HALF_UPLOADS: &str = "surefoot_half_uploads";
+/// What has arrived of them and lies on the disk until they are complete or given up.
+pub const HALF_UPLOAD_BYTES: &str = "surefoot_half_upload_bytes";
 
 /// Upper bounds of the buckets of every time, seconds: from a small read to a long assessment.
 const TIME_BUCKETS: [f64; 14] =
@@ -47,6 +51,8 @@ pub fn recorder() -> Result<PrometheusHandle, BuildError> {
     metrics::describe_counter!(UPLOAD_BYTES, metrics::Unit::Bytes, "Bytes of recordings that arrived");
     metrics::describe_gauge!(JOBS, "Jobs by state");
     metrics::describe_gauge!(EXPECTED, metrics::Unit::Seconds, "Expected computation of the jobs that wait");
+    metrics::describe_gauge!(HALF_UPLOADS, "Resumable uploads of which bytes are missing");
+    metrics::describe_gauge!(HALF_UPLOAD_BYTES, metrics::Unit::Bytes, "Bytes that have arrived of half uploads");
     *installed = Some(handle.clone());
     Ok(handle)
 }
@@ -58,7 +64,7 @@ pub fn router() -> OpenApiRouter<AppState> {
 
 /// Numbers for the operator
 ///
-/// Prometheus text: requests and their times, jobs by state, bytes uploaded.
+/// Prometheus text: requests and their times, jobs by state, bytes uploaded, half uploads.
 #[utoipa::path(get, path = "/metrics", tag = "health", security(()), operation_id = "read_metrics",
     responses((status = 200, description = "The numbers", body = String, content_type = "text/plain")))]
 async fn read_metrics(State(state): State<AppState>) -> Result<Response, ApiError> {
@@ -66,6 +72,9 @@ async fn read_metrics(State(state): State<AppState>) -> Result<Response, ApiErro
         metrics::gauge!(JOBS, "state" => job_state.name()).set(count as f64);
     }
     metrics::gauge!(EXPECTED).set(state.queue.expected_wait().await?.as_secs_f64());
+    let (half_uploads, bytes) = state.store.count_half_uploads().await?;
+    metrics::gauge!(HALF_UPLOADS).set(half_uploads as f64);
+    metrics::gauge!(HALF_UPLOAD_BYTES).set(bytes as f64);
     let content_type = (header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8");
     Ok(([content_type], state.metrics.render()).into_response())
 }

@@ -36,6 +36,8 @@ struct RecordingView {
     protocol: String,
     stored: String,
     content: String,
+    /// When its bytes were removed; empty while they are there.
+    removed: String,
     jobs: Vec<JobView>,
     assessments: Vec<AssessmentView>,
 }
@@ -100,7 +102,7 @@ pub(super) async fn show_recording(
 
 impl RecordingView {
     fn of(recording: StoredRecording, jobs: &[Job], assessments: &[StoredAssessment]) -> Self {
-        let StoredRecording { id, inspection, blob, created_at, .. } = recording;
+        let StoredRecording { id, inspection, blob, created_at, content_removed_at, .. } = recording;
         let protocol = inspection.header.protocol.as_deref();
         let mut content = vec![words::seconds(inspection.duration_s)];
         if inspection.n_frames > 0 {
@@ -118,6 +120,7 @@ impl RecordingView {
             protocol: protocol.map_or_else(|| "No protocol named".to_owned(), words::spoken),
             stored: words::moment(created_at),
             content: content.join(", "),
+            removed: content_removed_at.map(words::moment).unwrap_or_default(),
             jobs: jobs.iter().map(JobView::of).collect(),
             assessments: assessments.iter().map(AssessmentView::of).collect(),
         }

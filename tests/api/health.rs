@@ -39,6 +39,8 @@ async fn metrics_count_requests_by_route_and_jobs_by_state() {
         "surefoot_http_request_duration_seconds_bucket",
         r#"surefoot_jobs{state="queued"}"#,
         "surefoot_upload_bytes_total",
+        "surefoot_half_uploads 0",
+        "surefoot_half_upload_bytes 0",
     ] {
         assert!(text.contains(expected), "no `{expected}` in\n{text}");
     }

@@ -16,6 +16,7 @@ mod events;
 mod fall_risk;
 mod fusion;
 mod health;
+mod hostile_http;
 mod jobs;
 mod leg_pose;
 mod noise_models;

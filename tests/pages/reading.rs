@@ -5,6 +5,8 @@ use axum::body::Body;
 use axum::http::{Method, StatusCode};
 use serde_json::json;
 use surefoot::recording::encode;
+use surefoot::storage::audit::Actor;
+use surefoot::storage::retention::RetentionRules;
 use surefoot::storage::{NewPatient, Role};
 use surefoot::synthetic::{Exercise, Preset, SimulationSettings, simulate};
 
@@ -177,6 +179,12 @@ async fn a_recording_is_followed_from_its_upload_to_its_assessment() {
     ] {
         assert!(page.contains(part), "no `{part}` in {page}");
     }
+
+    let rules = RetentionRules { recordings: Some(time::Duration::milliseconds(1)), ..RetentionRules::default() };
+    clinic.state.store.apply_retention(&rules, Actor::service).await.unwrap();
+    let later = clinic.get(&format!("/app/sessions/{session}"), &cookie).await.body;
+    assert!(later.contains("itself was removed") && !done.contains("itself was removed"), "{later}");
+    assert!(later.contains(&format!("/app/assessments/{assessment}")), "the result stays: {later}");
 }
 
 #[tokio::test]

@@ -190,6 +190,20 @@ impl Store {
         rows.iter().map(upload_from_row).collect()
     }
 
+    /// How many uploads are half there, and the bytes of them that have arrived.
+    ///
+    /// # Errors
+    /// When the database fails.
+    pub async fn count_half_uploads(&self) -> Result<(u64, u64), StorageError> {
+        let row = query(
+            "SELECT count(*) AS n, CAST(coalesce(sum(received_bytes), 0) AS BIGINT) AS bytes
+             FROM resumable_uploads WHERE state = 'receiving'",
+        )
+        .fetch_one(self.reader())
+        .await?;
+        Ok((row::count(&row, "n")?, row::count(&row, "bytes")?))
+    }
+
     /// Ends an upload whose bytes are not taken; `problem` is the document that its client gets, now and later.
     ///
     /// # Errors
