@@ -1,7 +1,7 @@
 //! Retention: what is removed because it is old. Each rule is off until the operator sets it, because the law decides how long
 //! something must and may be kept. Every removal leaves an entry in the audit log.
 
-use super::audit::{Actor, AuditEvent, Thing, ThingKind, append};
+use super::audit::{Actor, AuditEvent, Thing, ThingKind};
 use super::clock::ms_from_time;
 use super::database::{Row, query};
 use super::erasure::ErasureOrder;
@@ -204,7 +204,7 @@ impl Store {
         }
         let thing = Thing { kind: ThingKind::Recording, id: recording.id.0 };
         let event = AuditEvent::of_command(now, actor, "retention: recording", Some(thing), String::new());
-        append(&mut transaction, &self.audit_secret, &[event]).await?;
+        self.audit_within(&mut transaction, event).await?;
         transaction.commit().await?;
         Ok(true)
     }
@@ -226,7 +226,7 @@ impl Store {
             .await?;
         let detail = json!({"answers": removed}).to_string();
         let event = AuditEvent::of_command(now, actor, "retention: kept answers", None, detail);
-        append(&mut transaction, &self.audit_secret, &[event]).await?;
+        self.audit_within(&mut transaction, event).await?;
         transaction.commit().await?;
         Ok(removed)
     }

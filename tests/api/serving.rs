@@ -7,7 +7,8 @@ use surefoot::cli::serve::{self, Running};
 use surefoot::config::Config;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-async fn start(folder: &tempfile::TempDir) -> Running {
+/// A service in a data directory of its own, at a free port.
+pub async fn start(folder: &tempfile::TempDir) -> Running {
     let listen = SocketAddr::from(([127, 0, 0, 1], 0));
     serve::start(Config { data_dir: folder.path().to_owned(), listen, ..Config::default() }).await.unwrap()
 }

@@ -136,11 +136,7 @@ impl Fields<'_> {
 }
 
 /// Adds entries at the end of the chain, inside the caller's transaction.
-pub(crate) async fn append(
-    connection: &mut Transaction,
-    secret: &Secret,
-    events: &[AuditEvent],
-) -> Result<(), StorageError> {
+async fn append(connection: &mut Transaction, secret: &Secret, events: &[AuditEvent]) -> Result<(), StorageError> {
     // An update, so that the row is held against every other process until the transaction ends.
     let state = query("UPDATE audit_state SET sequence = sequence WHERE id = 1 RETURNING sequence, hash")
         .fetch_one(&mut *connection)

@@ -18,8 +18,6 @@ pub use reading::{AuditEntry, AuditFilter, AuditedThing};
 pub use trail::AuditTrail;
 pub use verification::{BrokenLink, Verification};
 
-pub(crate) use chain::append;
-
 use super::{Client, OrganisationId, PatientId};
 use time::OffsetDateTime;
 use uuid::Uuid;

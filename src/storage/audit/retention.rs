@@ -1,7 +1,7 @@
 //! The old end of the log. Entries may be removed from the beginning on, never from the middle: an anchor says where the chain
 //! begins from then on, and an entry at its end tells of the removal, so that an anchor cannot appear unseen.
 
-use super::chain::{Hash, append};
+use super::chain::Hash;
 use super::{Actor, AuditEvent};
 use crate::storage::clock::ms_from_time;
 use crate::storage::database::query;
@@ -53,7 +53,7 @@ impl Store {
         query("DELETE FROM audit_entries WHERE sequence <= $1").bind(sequence).execute(&mut transaction).await?;
         let detail = json!({"entries": n, "up_to_sequence": sequence, "up_to_hash": hash.to_string()}).to_string();
         let event = AuditEvent::of_command(now, actor, "retention: audit", None, detail);
-        append(&mut transaction, &self.audit_secret, &[event]).await?;
+        self.audit_within(&mut transaction, event).await?;
         transaction.commit().await?;
         Ok(n.unsigned_abs())
     }

@@ -15,7 +15,7 @@ mod rows;
 
 pub(super) use list::LIST_FILE;
 
-use super::audit::{Actor, AuditEvent, Hash, Thing, append};
+use super::audit::{Actor, AuditEvent, Hash, Thing};
 use super::blobs::key_of_digest;
 use super::clock::ms_from_time;
 use super::{ErasureId, JobId, OrganisationId, PatientId, StorageError, Store, row};
@@ -224,7 +224,7 @@ impl Store {
         let mut event =
             AuditEvent::of_command(now, order.actor, "erasure", Some(order.patient.into()), detail.to_string());
         event.request_id = order.request_id.to_owned();
-        append(connection, &self.audit_secret, &[event]).await?;
+        self.audit_within(connection, event).await?;
         Ok(erasure)
     }
 
