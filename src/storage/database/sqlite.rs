@@ -3,7 +3,7 @@
 use super::{Database, schema};
 use crate::storage::{StorageError, maintenance};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{Sqlite, SqlitePool, Transaction};
+use sqlx::{Connection, Sqlite, SqlitePool, Transaction};
 use std::path::Path;
 use std::time::Duration;
 
@@ -27,7 +27,13 @@ pub(super) async fn open(path: &Path) -> Result<Database, StorageError> {
         // What a deleted row stood in is overwritten.
         .pragma("secure_delete", "ON");
     let pool = || SqlitePoolOptions::new().acquire_timeout(ACQUIRE_TIMEOUT).test_before_acquire(false);
-    let writer = pool().max_connections(1).connect_with(options.clone()).await?;
+    // A transaction that SQLite itself gave up, as on a disk that is full, cannot be rolled back once more, and the driver goes on
+    // to count it as open. Such a connection gives way to a new one before anyone else meets it.
+    let writer = pool()
+        .max_connections(1)
+        .before_acquire(|connection, _| Box::pin(std::future::ready(Ok(!connection.is_in_transaction()))))
+        .connect_with(options.clone())
+        .await?;
     if let Err(error) = MIGRATIONS.run(&writer).await {
         // A database from before there was such a table reaches nowhere.
         let reach = sqlx::query_scalar(schema::REACH).fetch_optional(&writer).await.unwrap_or_default();
@@ -38,24 +44,16 @@ pub(super) async fn open(path: &Path) -> Result<Database, StorageError> {
     Ok(Database::Sqlite { writer, readers })
 }
 
-/// Begins to write. A connection whose last transaction could neither be committed nor rolled back, as on a disk that was full, is
-/// of no use any more: it gives way to a new one.
+/// Begins to write: other processes that write are waited for here, not in the middle of the transaction.
 pub(super) async fn begin(writer: &SqlitePool) -> Result<Transaction<'static, Sqlite>, sqlx::Error> {
-    const STATEMENT: &str = "BEGIN IMMEDIATE";
-    match writer.begin_with(STATEMENT).await {
-        Err(sqlx::Error::InvalidSavePointStatement) => {
-            writer.acquire().await?.close().await?;
-            writer.begin_with(STATEMENT).await
-        }
-        begun => begun,
-    }
+    writer.begin_with("BEGIN IMMEDIATE").await
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::storage::{Access, ClientId, DATABASE_FILE, OrganisationId, PatientId, Store};
-    use sqlx::{ConnectOptions, Connection, SqliteConnection};
+    use sqlx::{ConnectOptions, SqliteConnection};
     use time::macros::datetime;
 
     #[tokio::test]
@@ -81,6 +79,31 @@ mod tests {
         .unwrap();
         assert_eq!(lax, [""; 0]);
         assert!(sqlx::query("INSERT INTO patients (id, organisation_id, pseudonym, created_at) VALUES (zeroblob(16), zeroblob(16), 'p', 0)").execute(&mut *writer).await.is_err());
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn writers_never_meet_a_connection_whose_transaction_was_given_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let database = open(&folder.path().join(DATABASE_FILE)).await.unwrap();
+        let writer = database.sqlite_writer().unwrap();
+        let writes: Vec<_> = (0..40)
+            .map(|number| {
+                let writer = writer.clone();
+                tokio::spawn(async move {
+                    let mut transaction = begin(&writer).await.unwrap();
+                    if number % 2 == 0 {
+                        // No page more than there are: the connection's own full disk.
+                        sqlx::query("PRAGMA max_page_count = 1").execute(&mut *transaction).await.unwrap();
+                        let refused = sqlx::query("CREATE TABLE too_much AS SELECT zeroblob(100000)");
+                        let error = refused.execute(&mut *transaction).await.unwrap_err();
+                        assert_eq!(error.as_database_error().unwrap().code().as_deref(), Some("13"), "{error}");
+                    }
+                })
+            })
+            .collect();
+        for write in writes {
+            write.await.unwrap();
+        }
     }
 
     #[tokio::test]
