@@ -63,6 +63,9 @@ pub struct Args {
     /// Height of the camera in metres [default: by the tilt]
     #[arg(long)]
     camera_height: Option<f64>,
+    /// Also write what two colour cameras at the sides see, for the cue `rgb`
+    #[arg(long)]
+    side_cameras: bool,
     /// Leave out all errors of the sensor but its whole codes
     #[arg(long)]
     clean: bool,
@@ -103,7 +106,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let simulation = WalkerSimulation::new(&settings(args), body(args)?)?;
     let file = fs::File::create(&args.out).with_context(|| format!("cannot write {}", args.out.display()))?;
     let bar = progress_bar(simulation.len() as u64)?;
-    let file = simulation.write(BufWriter::new(file), |k| bar.set_position(k as u64))?;
+    let (file, progress) = (BufWriter::new(file), |k| bar.set_position(k as u64));
+    let file = if args.side_cameras {
+        simulation.write_with_sides(file, progress)?
+    } else {
+        simulation.write(file, progress)?
+    };
     bar.finish_and_clear();
     let bytes = file.into_inner().map_err(|error| error.into_error())?.metadata()?.len();
     let (frames, steps) = (simulation.len(), simulation.steps().len());
@@ -178,8 +186,22 @@ mod tests {
         simulate(&b, &["--tilt-deg", "10", "--missing", "0.3"]).unwrap();
         assert_eq!(fs::read(&a).unwrap(), fs::read(&b).unwrap());
         let reader = DepthReader::open(fs::File::open(&a).unwrap(), &Limits::default()).unwrap();
+        assert!(reader.side_cameras().is_none());
         assert!((reader.calibration().unwrap().camera_tilt_deg.unwrap() - 10.0).abs() < 1e-9);
         assert_eq!(reader.count(), 3);
+    }
+
+    #[test]
+    fn cameras_at_the_sides_see_every_image_when_they_are_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("walk.mcap");
+        simulate(&out, &["--side-cameras"]).unwrap();
+        let mut reader = DepthReader::open(fs::File::open(&out).unwrap(), &Limits::default()).unwrap();
+        assert!(reader.side_cameras().is_some_and(|[left, right]| left.first != right.first));
+        while let Some(image) = reader.next() {
+            image.unwrap();
+            assert!(reader.side_images().unwrap().is_some());
+        }
     }
 
     #[test]

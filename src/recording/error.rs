@@ -28,7 +28,7 @@ impl DecodeError {
 }
 
 /// Every code of a [`DecodeError`], sorted; `docs/recording-format.md` says what each means.
-pub const DECODE_CODES: [&str; 40] = [
+pub const DECODE_CODES: [&str; 41] = [
     "acceleration_unit",
     "angular_rate_unit",
     "bad_quaternion",
@@ -40,6 +40,7 @@ pub const DECODE_CODES: [&str; 40] = [
     "duplicate_joint",
     "empty_recording",
     "invalid_depth",
+    "invalid_image",
     "invalid_json",
     "invalid_mcap",
     "invalid_value",

@@ -7,10 +7,12 @@ use std::io::{Cursor, Write};
 use surefoot::assessment::{LegPoseSettings, Settings};
 use surefoot::body::Joint;
 use surefoot::fall_risk::Answers;
+use surefoot::geometry::colour_image::ColourImage;
 use surefoot::progress::Monitor;
 use surefoot::recording::decode::{DepthReader, Format, Inspector, Limits, decode};
 use surefoot::recording::depth::{DepthImage, DepthUnit};
 use surefoot::recording::import::{CameraFile, RawImages};
+use surefoot::recording::side_camera::png_image;
 use surefoot::recording::{Header, Recording, SkeletonRecording, encode};
 use surefoot::report::TrainingPlan;
 use surefoot::synthetic::walker::{Course, WalkerSettings, WalkerSimulation, cesium, trousers};
@@ -31,6 +33,7 @@ pub const DECODERS: &[Decoder] = &[
     Decoder { name: "mcap", cost: 1, shape: Shape::Mcap, read: read_mcap, seeds: mcap_seeds },
     Decoder { name: "json", cost: 1, shape: Shape::Text, read: read_json, seeds: json_seeds },
     Decoder { name: "depth_mcap", cost: 100, shape: Shape::Mcap, read: read_depth, seeds: depth_seeds },
+    Decoder { name: "side_images", cost: 1, shape: Shape::Bytes, read: read_side_image, seeds: side_image_seeds },
     Decoder { name: "raw_depth", cost: 1, shape: Shape::Bytes, read: read_raw_depth, seeds: raw_depth_seeds },
     Decoder { name: "camera_file", cost: 1, shape: Shape::Text, read: read_camera_file, seeds: camera_file_seeds },
     Decoder { name: "gltf", cost: 1, shape: Shape::Bytes, read: read_gltf, seeds: gltf_seeds },
@@ -114,6 +117,18 @@ fn read_depth(bytes: &[u8]) -> bool {
         let _ = surefoot::pipeline::leg_pose::assess(reader, &LegPoseSettings::default(), &Monitor::default());
     }
     true
+}
+
+/// A colour image, and labels.
+fn side_image_seeds() -> Vec<Vec<u8>> {
+    let image = ColourImage { width: 9, height: 7, pixels: (0..63).map(|k| [k, 3 * k, 255 - k]).collect() };
+    let labels: Vec<u8> = (0..63).map(|k| k % 7).collect();
+    vec![png_image::encode_colour(&image).unwrap(), png_image::encode_labels([9, 7], &labels).unwrap()]
+}
+
+fn read_side_image(bytes: &[u8]) -> bool {
+    let is_colour = png_image::colour(bytes).is_ok_and(|image| image.pixels.len() == image.width * image.height);
+    is_colour || png_image::labels(bytes).is_ok_and(|([width, height], labels)| labels.len() == width * height)
 }
 
 const CAMERA: &str =

@@ -15,7 +15,6 @@ use surefoot::pipeline::leg_pose::{DeclaredMount, DepthFrames, assess};
 use surefoot::progress::Monitor;
 use surefoot::recording::depth::{DepthImage, DepthReader, DepthUnit, MISSING_RAW};
 use surefoot::recording::import::{CameraFile, import_depth};
-use surefoot::recording::side_camera::{SideCamera, SideImages};
 use surefoot::recording::{DecodeError, Limits};
 use surefoot::synthetic::walker::trousers::trousers;
 use surefoot::synthetic::walker::{Course, WalkerFrame, WalkerSettings, WalkerSimulation};
@@ -232,34 +231,10 @@ fn the_papers_filter_follows_the_true_ankles_on_any_number_of_threads() {
 
 #[test]
 fn the_colour_cue_follows_where_there_are_cameras_at_the_sides_and_is_refused_where_not() {
-    struct WithSides {
-        frames: Changed<fn(&mut DepthImage)>,
-        cameras: [SideCamera; 2],
-        images: Option<SideImages>,
-        n_read: usize,
-    }
-    impl DepthFrames for WithSides {
-        fn next_into(&mut self, image: &mut DepthImage) -> Result<Option<i64>, DecodeError> {
-            let time = self.frames.next_into(image)?;
-            self.images = time.map(|_| WALK.side_images(self.n_read));
-            self.n_read += 1;
-            Ok(time)
-        }
-        fn intrinsics(&self) -> Option<Intrinsics> {
-            self.frames.intrinsics()
-        }
-        fn background(&self) -> Option<&DepthImage> {
-            DepthFrames::background(&self.frames)
-        }
-        fn side_cameras(&self) -> Option<&[SideCamera; 2]> {
-            Some(&self.cameras)
-        }
-        fn side_images(&self) -> Option<&SideImages> {
-            self.images.as_ref()
-        }
-    }
-    let frames: Changed<fn(&mut DepthImage)> = Changed::new(4, |_| {});
-    let frames = WithSides { frames, cameras: WALK.side_cameras(), images: None, n_read: 0 };
+    let settings = WalkerSettings { duration_s: 4.0 / WALK.settings().rate_hz, ..*WALK.settings() };
+    let simulation = WalkerSimulation::new(&settings, trousers()).unwrap();
+    let bytes = simulation.write_with_sides(Cursor::new(Vec::new()), |_| {}).unwrap().into_inner();
+    let frames = read(&bytes);
     let settings = paper(LegCues::Rgb, 256);
     let found = assess(frames, &settings, &Monitor::default()).unwrap();
     let depths = &series(&found, "left_ankle_z_m").value;

@@ -3,17 +3,15 @@
 use super::method::WalkerMethod;
 use super::{Errors, MethodErrors, true_ankles};
 use crate::body::Side;
-use crate::geometry::camera::Intrinsics;
 use crate::pipeline::PipelineError;
 use crate::pipeline::leg_pose::foreground::Foreground;
 use crate::pipeline::leg_pose::leg_model::LegPoint;
 use crate::pipeline::leg_pose::two_legs::TwoLegs;
-use crate::pipeline::leg_pose::{DepthFrames, Legs, track};
+use crate::pipeline::leg_pose::{Legs, track};
 use crate::progress::Monitor;
-use crate::recording::depth::{DepthImage, DepthReader};
+use crate::recording::Limits;
+use crate::recording::depth::DepthReader;
 use crate::recording::encode::EncodeError;
-use crate::recording::side_camera::{SideCamera, SideImages};
-use crate::recording::{DecodeError, Limits};
 use crate::synthetic::walker::{FrameTruth, WalkerSimulation};
 use nalgebra::Vector3;
 use std::io::Cursor;
@@ -40,12 +38,14 @@ pub fn compare(
     particles: u32,
 ) -> Result<Vec<MethodErrors>, WalkError> {
     let truth: Vec<FrameTruth> = (0..simulation.len()).map(|k| simulation.truth(k)).collect();
-    let recording = simulation.write(Cursor::new(Vec::new()), |_| {})?.into_inner();
-    methods.iter().map(|method| Ok(errors_of(simulation, &recording, &truth, *method, particles)?)).collect()
+    let needs_colour = methods.iter().any(|method| matches!(method, WalkerMethod::Paper(cues) if cues.has_colour()));
+    let out = Cursor::new(Vec::new());
+    let written = if needs_colour { simulation.write_with_sides(out, |_| {}) } else { simulation.write(out, |_| {}) };
+    let recording = written?.into_inner();
+    methods.iter().map(|method| Ok(errors_of(&recording, &truth, *method, particles)?)).collect()
 }
 
 fn errors_of(
-    simulation: &WalkerSimulation,
     recording: &[u8],
     truth: &[FrameTruth],
     method: WalkerMethod,
@@ -56,7 +56,7 @@ fn errors_of(
         let legs = TwoLegs::find(&foreground.points);
         feet.push(legs.map(|legs| Side::BOTH.map(|side| legs.foot(side))));
     };
-    let frames = RecordedWalk::new(recording, simulation, method)?;
+    let frames = DepthReader::open(recording, &Limits::default())?;
     let track = track(frames, &method.settings(particles), &mut watch, &Monitor::default())?;
     let mut errors = Errors::default();
     for (k, truth) in truth.iter().enumerate() {
@@ -80,55 +80,6 @@ fn errors_of(
         }
     }
     Ok(errors.summary(method.name(), truth.len()))
-}
-
-/// A simulated walk as it was recorded, and for methods that look at them the colour images, which are rendered again.
-struct RecordedWalk<'a> {
-    reader: DepthReader<&'a [u8]>,
-    simulation: &'a WalkerSimulation,
-    cameras: Option<[SideCamera; 2]>,
-    images: Option<SideImages>,
-    n_read: usize,
-}
-
-impl<'a> RecordedWalk<'a> {
-    fn new(recording: &'a [u8], simulation: &'a WalkerSimulation, method: WalkerMethod) -> Result<Self, DecodeError> {
-        let has_colour = matches!(method, WalkerMethod::Paper(cues) if cues.has_colour());
-        Ok(Self {
-            reader: DepthReader::open(recording, &Limits::default())?,
-            simulation,
-            cameras: has_colour.then(|| simulation.side_cameras()),
-            images: None,
-            n_read: 0,
-        })
-    }
-}
-
-impl DepthFrames for RecordedWalk<'_> {
-    fn next_into(&mut self, image: &mut DepthImage) -> Result<Option<i64>, DecodeError> {
-        let time_ns = self.reader.next_into(image)?;
-        if time_ns.is_some() {
-            self.images = self.cameras.is_some().then(|| self.simulation.side_images(self.n_read));
-            self.n_read += 1;
-        }
-        Ok(time_ns)
-    }
-
-    fn intrinsics(&self) -> Option<Intrinsics> {
-        DepthFrames::intrinsics(&self.reader)
-    }
-
-    fn background(&self) -> Option<&DepthImage> {
-        self.reader.background()
-    }
-
-    fn side_cameras(&self) -> Option<&[SideCamera; 2]> {
-        self.cameras.as_ref()
-    }
-
-    fn side_images(&self) -> Option<&SideImages> {
-        self.images.as_ref()
-    }
 }
 
 #[cfg(test)]

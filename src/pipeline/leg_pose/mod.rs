@@ -40,6 +40,7 @@ use foreground::{Foreground, Preparation, Region};
 use leg_model::{LegPoint, LegSegment, POINTS, ShapePrior, ShapeVector, point_of};
 use nalgebra::Vector3;
 use paper::PaperRun;
+use paper::colour_cue::Templates;
 use shape_fit::calibrate;
 use smoother::{SmoothedFrame, Smoother};
 use static_scene::StaticScene;
@@ -77,9 +78,12 @@ pub trait DepthFrames {
     fn side_cameras(&self) -> Option<&[SideCamera; 2]> {
         None
     }
-    /// What they saw at the time of the last image.
-    fn side_images(&self) -> Option<&SideImages> {
-        None
+    /// What they saw at the time of the last image; nothing when there is no image of both.
+    ///
+    /// # Errors
+    /// The defect of an image.
+    fn side_images(&self) -> Result<Option<SideImages>, DecodeError> {
+        Ok(None)
     }
     /// What the recording says of the camera's mount.
     fn declared_mount(&self) -> DeclaredMount {
@@ -107,6 +111,14 @@ impl<R: Read> DepthFrames for DepthReader<R> {
 
     fn background(&self) -> Option<&DepthImage> {
         DepthReader::background(self)
+    }
+
+    fn side_cameras(&self) -> Option<&[SideCamera; 2]> {
+        DepthReader::side_cameras(self)
+    }
+
+    fn side_images(&self) -> Result<Option<SideImages>, DecodeError> {
+        DepthReader::side_images(self)
     }
 
     fn declared_mount(&self) -> DeclaredMount {
@@ -239,31 +251,39 @@ pub fn track(
     };
     monitor.begin(Step::Calibrating, 0)?;
     let mut run = Run::start(&mut frames, camera, settings)?;
-    if settings.mode == LegPoseMode::Paper && settings.cues.has_colour() && frames.side_cameras().is_none() {
-        return Err(PipelineError::unsuitable(
-            "no_side_images",
-            "the cue `rgb` needs two colour cameras at the sides, and the recording has none; depth alone is weighed by \
-             `distance`, `projection` or `both`",
-        ));
-    }
-    let mut paper = (settings.mode == LegPoseMode::Paper).then(|| {
+    let mut paper = None;
+    if settings.mode == LegPoseMode::Paper {
         let background = frames.background().map(DepthImage::to_depth_map);
-        PaperRun::new(settings, camera, run.preparation.floor().clone(), background)
-    });
+        let templates = settings.cues.has_colour().then(|| templates(&frames)).transpose()?;
+        paper = Some(PaperRun::new(settings, camera, run.preparation.floor().clone(), background, templates));
+    }
     while let Some((time_ns, foreground)) = run.next(&mut frames)? {
         watch(time_ns, &foreground);
         match &mut paper {
             Some(paper) => {
                 run.count(time_ns, &foreground);
                 // Of images that were read ahead, only the last one is of the time at which the sides are seen.
-                let sides = frames.side_cameras().zip(frames.side_images()).filter(|_| run.early.is_empty());
-                paper.take(time_ns, &run.map, sides);
+                let sees_sides = settings.cues.has_colour() && run.early.is_empty();
+                let sides = if sees_sides { frames.side_images()? } else { None };
+                paper.take(time_ns, &run.map, sides.as_ref());
             }
             None => run.take(time_ns, foreground),
         }
         monitor.advance(1)?;
     }
     Ok(run.finish(paper))
+}
+
+/// What the legs look like from the sides, for the colour cue.
+fn templates(frames: &impl DepthFrames) -> Result<Templates, PipelineError> {
+    frames.side_cameras().and_then(Templates::new).ok_or_else(|| {
+        PipelineError::unsuitable(
+            "no_side_images",
+            "the cue `rgb` needs two colour cameras at the sides, calibrated and with legs labelled in their first images \
+             (`/side/left`, `/side/right`), and the recording has none; depth alone is weighed by `distance`, `projection` \
+             or `both`",
+        )
+    })
 }
 
 /// A recording half-way through.

@@ -3,6 +3,7 @@
 use super::json_error::defect_in_json;
 use super::limits::Limits;
 use super::record::Channel;
+use super::side::{EncodedSides, SideAssembler, SideTopic};
 use crate::recording::DecodeError;
 use crate::recording::depth::summary::DepthStatistics;
 use crate::recording::depth::{DepthCalibration, DepthDecoder, DepthImage, DepthSummary, DepthUnit, ImageHeader};
@@ -42,6 +43,8 @@ impl DepthTopic {
 pub(super) struct EncodedImage {
     pub(super) time_ns: i64,
     pub(super) message: Vec<u8>,
+    /// What the cameras at the sides saw at its time, as it arrived.
+    pub(super) sides: Option<EncodedSides>,
 }
 
 /// Checks depth images; hands them on, as they arrived, only when asked to.
@@ -49,6 +52,8 @@ pub(super) struct DepthAssembler {
     limits: Limits,
     pub(super) calibration: Option<DepthCalibration>,
     pub(super) background: Option<DepthImage>,
+    /// The colour images, checked apart.
+    pub(super) sides: SideAssembler,
     /// Images that a reader has yet to take; absent when nobody does. No longer than what one chunk holds.
     pub(super) queue: Option<VecDeque<EncodedImage>>,
     declared: Vec<DepthTopic>,
@@ -67,6 +72,7 @@ impl DepthAssembler {
             limits,
             calibration: None,
             background: None,
+            sides: SideAssembler::default(),
             queue: None,
             declared: Vec::new(),
             decoder: DepthDecoder::default(),
@@ -126,6 +132,27 @@ impl DepthAssembler {
         }
     }
 
+    /// Takes one message of a camera at the side.
+    pub(super) fn side_message(&mut self, topic: SideTopic, log_time: u64, data: &[u8]) -> Result<(), DecodeError> {
+        if topic.comes_once() {
+            self.check_place(self.sides.has(topic), &topic.place())?;
+        }
+        let n_bytes = self.sides.message(topic, log_time, data, &self.limits, self.queue.is_none())?;
+        self.count_bytes(n_bytes, || topic.place())
+    }
+
+    fn count_bytes(&mut self, n_bytes: u64, place: impl FnOnce() -> String) -> Result<(), DecodeError> {
+        self.n_bytes += n_bytes;
+        if self.n_bytes <= self.limits.max_depth_bytes {
+            return Ok(());
+        }
+        let sentence = format!(
+            "the images hold more than {} bytes after decompression; split the recording",
+            self.limits.max_depth_bytes
+        );
+        Err(DecodeError::new("decompression_limit", sentence).at(place()))
+    }
+
     /// What comes once must come before the images, so that one pass is enough to use it.
     fn check_place(&self, is_second: bool, place: &str) -> Result<(), DecodeError> {
         let sentence = match (is_second, self.n_frames) {
@@ -158,17 +185,14 @@ impl DepthAssembler {
         self.check_time(time_ns).map_err(|defect| defect.at(format!("{place}.time_ns")))?;
         let header = ImageHeader::parse(data).map_err(|defect| defect.at(place.as_str()))?;
         self.check_shape(&header).map_err(|defect| defect.at(place.as_str()))?;
-        self.n_bytes += 2 * (header.width * header.height) as u64;
-        if self.n_bytes > self.limits.max_depth_bytes {
-            let sentence = format!(
-                "the depth images hold more than {} bytes after decompression; split the recording",
-                self.limits.max_depth_bytes
-            );
-            return Err(DecodeError::new("decompression_limit", sentence).at(place));
+        self.count_bytes(2 * (header.width * header.height) as u64, || place.clone())?;
+        if self.n_frames == 0 {
+            self.sides.settle()?;
         }
+        let sides = self.sides.beside(time_ns);
         match &mut self.queue {
             // Whoever takes it from the queue decodes it, and finds what is wrong with it.
-            Some(queue) => queue.push_back(EncodedImage { time_ns, message: data.to_owned() }),
+            Some(queue) => queue.push_back(EncodedImage { time_ns, message: data.to_owned(), sides }),
             None => {
                 self.decoder.decode_into(data, &mut self.image).map_err(|defect| defect.at(place))?;
                 self.statistics.add(time_ns, &self.image);
@@ -216,13 +240,14 @@ impl DepthAssembler {
             }
             // Whoever takes the images from the queue has no use for a summary of none.
             _ if self.queue.is_some() => Ok(None),
-            n => Ok(Some(self.statistics.summary(
-                n,
-                self.span_ns,
-                &self.image,
-                self.calibration.is_some(),
-                self.background.is_some(),
-            ))),
+            n => {
+                let (has_calibration, has_background) = (self.calibration.is_some(), self.background.is_some());
+                let mut summary =
+                    self.statistics.summary(n, self.span_ns, &self.image, has_calibration, has_background);
+                summary.side_cameras = self.sides.summary();
+                summary.warnings.extend(self.sides.warning());
+                Ok(Some(summary))
+            }
         }
     }
 }

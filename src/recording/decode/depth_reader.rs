@@ -1,7 +1,9 @@
 //! The depth images of a recording, one by one: memory does not grow with the recording.
 
+use super::side::EncodedSides;
 use super::{Decoder, Format, Limits};
 use crate::recording::depth::{DepthCalibration, DepthDecoder, DepthImage, DepthUnit};
+use crate::recording::side_camera::{SIDE_NAMES, SideCamera, SideImages, png_image};
 use crate::recording::{DecodeError, Header, Recording};
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read};
@@ -23,6 +25,9 @@ pub struct DepthReader<R> {
     header: Header,
     calibration: Option<DepthCalibration>,
     background: Option<DepthImage>,
+    side_cameras: Option<[SideCamera; 2]>,
+    /// What the cameras at the sides saw at the time of the last image, as it arrived.
+    sides: Option<EncodedSides>,
     images: DepthDecoder,
     piece: Vec<u8>,
     /// Images that have yet to be taken once the decoder is gone.
@@ -48,6 +53,8 @@ impl<R: Read> DepthReader<R> {
             header: Header::default(),
             calibration: None,
             background: None,
+            side_cameras: None,
+            sides: None,
             images: DepthDecoder::default(),
             piece: vec![0; PIECE],
             waiting: VecDeque::new(),
@@ -78,6 +85,23 @@ impl<R: Read> DepthReader<R> {
         self.background.as_ref()
     }
 
+    /// The colour cameras at the sides, when they are described, labelled and began before the depth images.
+    pub fn side_cameras(&self) -> Option<&[SideCamera; 2]> {
+        self.side_cameras.as_ref()
+    }
+
+    /// What they saw at the time of the last image that was read; nothing when there is no image of both.
+    ///
+    /// # Errors
+    /// `invalid_image`.
+    pub fn side_images(&self) -> Result<Option<SideImages>, DecodeError> {
+        let Some([left, right]) = &self.sides else { return Ok(None) };
+        let decode = |side: usize, message: &[u8]| {
+            png_image::colour(message).map_err(|defect| defect.at(format!("side.{}", SIDE_NAMES[side])))
+        };
+        Ok(Some([decode(0, left)?, decode(1, right)?]))
+    }
+
     /// Reads the next image over another one and answers its time in nanoseconds; nothing at the end.
     ///
     /// # Errors
@@ -101,6 +125,7 @@ impl<R: Read> DepthReader<R> {
         let place = format!("depth[{}]", self.n_taken);
         self.images.decode_into(&next.message, image).map_err(|defect| defect.at(place))?;
         self.n_taken += 1;
+        self.sides = next.sides;
         Ok(Some(next.time_ns))
     }
 
@@ -138,6 +163,7 @@ impl<R: Read> DepthReader<R> {
             self.header = assembler.header.as_ref().map(|(header, _)| header.clone()).unwrap_or_default();
             self.calibration = assembler.depth.calibration;
             self.background = assembler.depth.background.take();
+            self.side_cameras = assembler.depth.sides.usable().cloned();
         }
         std::mem::swap(&mut self.waiting, queue);
     }

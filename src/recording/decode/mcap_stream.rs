@@ -233,6 +233,7 @@ impl Content {
                 assembler.inertial.batch(*number, batch.into_samples(), &place)
             }
             Topic::Depth(topic) => assembler.depth.message(*topic, message.log_time, message.data),
+            Topic::Side(topic) => assembler.depth.side_message(*topic, message.log_time, message.data),
             Topic::Ignored(topic) => {
                 assembler.ignore(topic);
                 Ok(())

@@ -16,6 +16,7 @@ mod limits;
 mod mcap_stream;
 mod message;
 mod record;
+mod side;
 #[cfg(test)]
 mod tests;
 mod topic;

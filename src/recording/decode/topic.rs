@@ -4,6 +4,7 @@ use super::assembler::Assembler;
 use super::depth::DepthTopic;
 use super::inertial::Declaration;
 use super::record::Channel;
+use super::side::SideTopic;
 use crate::recording::DecodeError;
 use std::collections::BTreeMap;
 
@@ -16,6 +17,7 @@ pub(super) enum Topic {
     Reference { number: usize, n_batches: u64 },
     Inertial { number: usize, n_batches: u64 },
     Depth(DepthTopic),
+    Side(SideTopic),
     Ignored(String),
 }
 
@@ -30,6 +32,10 @@ pub(super) fn topic(channel: &Channel<'_>, assembler: &mut Assembler) -> Result<
     if let Some(topic) = DepthTopic::of_channel(channel)? {
         assembler.depth.declare(topic, name)?;
         return Ok(Topic::Depth(topic));
+    }
+    if let Some(topic) = SideTopic::of_channel(channel)? {
+        assembler.depth.sides.declare(topic, name)?;
+        return Ok(Topic::Side(topic));
     }
     if name.starts_with("/x/") {
         return Ok(Topic::Ignored(name.to_owned()));

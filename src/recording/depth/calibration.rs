@@ -48,6 +48,9 @@ const TILT_DEG: std::ops::RangeInclusive<f64> = -90.0..=90.0;
 /// Accepted deviation of a quaternion's norm from one, as for joints.
 const QUATERNION_TOLERANCE: f64 = 0.01;
 
+/// No camera of a recording is farther from its origin, metres.
+const FARTHEST_M: f64 = 100.0;
+
 impl DepthCalibration {
     /// A calibration with nothing known of the mounting.
     pub fn of_intrinsics(camera: &Intrinsics) -> Self {
@@ -62,22 +65,13 @@ impl DepthCalibration {
 
     /// Where the camera is, when that was said.
     pub fn world_from_sensor(&self) -> Option<Isometry3<f64>> {
-        let Mounting { rotation: [w, x, y, z], translation_m } = self.world_from_sensor?;
-        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        Some(Isometry3::from_parts(Translation3::from(Vector3::from(translation_m)), rotation))
+        self.world_from_sensor.map(|mounting| mounting.isometry())
     }
 
     /// The first value that no camera has, with a sentence.
     pub(crate) fn defect(&self) -> Option<(&'static str, String)> {
-        for (name, value) in [("fx", self.fx), ("fy", self.fy)] {
-            if !FOCAL_PX.contains(&value) {
-                return Some((name, format!("the focal length is {value}, expected pixels from 20 to 20000")));
-            }
-        }
-        for (name, value) in [("cx", self.cx), ("cy", self.cy)] {
-            if !value.is_finite() || value.abs() > *FOCAL_PX.end() {
-                return Some((name, format!("the optical axis is at {value}, expected pixels")));
-            }
+        if let Some(defect) = intrinsics_defect(&self.intrinsics()) {
+            return Some(defect);
         }
         if let Some(height) = self.camera_height_m.filter(|height| !HEIGHT_M.contains(height)) {
             return Some(("camera_height_m", format!("the height is {height}, expected metres from 0 to 5")));
@@ -85,14 +79,43 @@ impl DepthCalibration {
         if let Some(tilt) = self.camera_tilt_deg.filter(|tilt| !TILT_DEG.contains(tilt)) {
             return Some(("camera_tilt_deg", format!("the tilt is {tilt}, expected degrees from -90 to 90")));
         }
-        let mounting = self.world_from_sensor?;
-        let norm = mounting.rotation.iter().map(|q| q * q).sum::<f64>().sqrt();
-        let is_unit = (norm - 1.0).abs() <= QUATERNION_TOLERANCE;
-        (!is_unit || !mounting.translation_m.iter().all(|t| t.abs() <= 100.0)).then(|| {
-            let sentence = "expected a unit quaternion w, x, y, z and a translation within 100 m".to_owned();
-            ("world_from_sensor", sentence)
-        })
+        self.world_from_sensor?.defect().map(|sentence| ("world_from_sensor", sentence))
     }
+}
+
+impl Mounting {
+    /// A transform as it is written.
+    pub fn of_isometry(isometry: &Isometry3<f64>) -> Self {
+        let q = isometry.rotation;
+        Self { rotation: [q.w, q.i, q.j, q.k], translation_m: isometry.translation.vector.into() }
+    }
+
+    /// The transform.
+    pub fn isometry(&self) -> Isometry3<f64> {
+        let [w, x, y, z] = self.rotation;
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        Isometry3::from_parts(Translation3::from(Vector3::from(self.translation_m)), rotation)
+    }
+
+    /// What is wrong with it, in one sentence.
+    pub(crate) fn defect(&self) -> Option<String> {
+        let norm = self.rotation.iter().map(|q| q * q).sum::<f64>().sqrt();
+        let is_unit = (norm - 1.0).abs() <= QUATERNION_TOLERANCE;
+        let is_near = self.translation_m.iter().all(|t| t.abs() <= FARTHEST_M);
+        let sentence = || format!("expected a unit quaternion w, x, y, z and a translation within {FARTHEST_M} m");
+        (!is_unit || !is_near).then(sentence)
+    }
+}
+
+/// The first of a camera's intrinsics that no camera has, with a sentence.
+pub(crate) fn intrinsics_defect(camera: &Intrinsics) -> Option<(&'static str, String)> {
+    let focal = [("fx", camera.fx), ("fy", camera.fy)].into_iter().find(|(_, value)| !FOCAL_PX.contains(value));
+    if let Some((name, value)) = focal {
+        return Some((name, format!("the focal length is {value}, expected pixels from 20 to 20000")));
+    }
+    let is_far = |value: f64| !value.is_finite() || value.abs() > *FOCAL_PX.end();
+    let (name, value) = [("cx", camera.cx), ("cy", camera.cy)].into_iter().find(|(_, value)| is_far(*value))?;
+    Some((name, format!("the optical axis is at {value}, expected pixels")))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What is known of a series of depth images that was read once, and what is doubtful about it.
 
 use super::{DepthImage, DepthUnit};
+use crate::recording::side_camera::SideCameraSummary;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -39,6 +40,8 @@ pub enum DepthWarningKind {
     Noise,
     /// An interval between images that is much longer than the others.
     DropOut,
+    /// Colour images of cameras at the sides that cannot be used.
+    SideCameras,
 }
 
 /// A doubt about the depth images; they are accepted all the same.
@@ -77,6 +80,9 @@ pub struct DepthSummary {
     pub has_calibration: bool,
     /// Whether there is an image without the person.
     pub has_background: bool,
+    /// The colour images of cameras at the sides, when there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub side_cameras: Option<SideCameraSummary>,
     /// Doubts about the images.
     pub warnings: Vec<DepthWarning>,
 }
@@ -136,6 +142,7 @@ impl DepthStatistics {
             n_empty_frames: self.n_empty,
             has_calibration,
             has_background,
+            side_cameras: None,
             warnings: Vec::new(),
         };
         summary.warnings = self.warnings(&summary);

@@ -2,6 +2,7 @@
 
 use super::{DepthCalibration, DepthCoding, DepthEncoder, DepthImage};
 use crate::recording::encode::{self, EncodeError};
+use crate::recording::side_camera::{SIDE_NAMES, SideCalibration, SideCamera, SideImages, png_image};
 use crate::recording::{Header, ReferenceSeries};
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
@@ -16,6 +17,9 @@ pub struct DepthWriter<W: Write + Seek> {
     encoder: DepthEncoder,
     channel: u16,
     n_frames: u32,
+    /// Channels of the colour cameras at the sides, and images of each.
+    side_channels: Option<[u16; 2]>,
+    n_sides: u32,
 }
 
 impl<W: Write + Seek> DepthWriter<W> {
@@ -40,7 +44,43 @@ impl<W: Write + Seek> DepthWriter<W> {
             file.write_to_known_channel(&message_header(backgrounds, 0, 0), encoder.encode(background)?)?;
         }
         let channel = file.add_channel(0, "/depth", encode::DEPTH_ENCODING, &BTreeMap::new())?;
-        Ok(Self { file, encoder, channel, n_frames: 0 })
+        Ok(Self { file, encoder, channel, n_frames: 0, side_channels: None, n_sides: 0 })
+    }
+
+    /// Describes the colour cameras at the sides, with the labels of their first images; before the first depth image.
+    ///
+    /// # Errors
+    /// [`EncodeError`] when there are not as many labels as pixels, or when writing fails.
+    pub fn describe_sides(&mut self, cameras: &[SideCamera; 2]) -> Result<(), EncodeError> {
+        let mut channels = [0; 2];
+        for ((camera, name), channel) in cameras.iter().zip(SIDE_NAMES).zip(&mut channels) {
+            let mut once = |topic: &str, encoding: &str, content: &[u8]| {
+                let id = self.file.add_channel(0, &format!("/side/{name}/{topic}"), encoding, &BTreeMap::new())?;
+                self.file.write_to_known_channel(&message_header(id, 0, 0), content)
+            };
+            once("calibration", "json", &serde_json::to_vec(&SideCalibration::of_camera(camera))?)?;
+            let size = [camera.first.width, camera.first.height];
+            once("labels", "png", &png_image::encode_labels(size, &camera.labels)?)?;
+            *channel = self.file.add_channel(0, &format!("/side/{name}"), "png", &BTreeMap::new())?;
+        }
+        self.side_channels = Some(channels);
+        Ok(())
+    }
+
+    /// Writes what the cameras at the sides saw at the time of the next image.
+    ///
+    /// # Errors
+    /// [`EncodeError`] when the cameras were not described, for a negative time, or when writing fails.
+    pub fn write_sides(&mut self, time_ns: i64, images: &SideImages) -> Result<(), EncodeError> {
+        let channels =
+            self.side_channels.ok_or(EncodeError::Unsuitable("the cameras at the sides are not described"))?;
+        let time = u64::try_from(time_ns).map_err(|_| EncodeError::Unsuitable("a time stamp is negative"))?;
+        for (channel, image) in channels.into_iter().zip(images) {
+            let header = message_header(channel, self.n_sides, time);
+            self.file.write_to_known_channel(&header, &png_image::encode_colour(image)?)?;
+        }
+        self.n_sides += 1;
+        Ok(())
     }
 
     /// Writes the next image.

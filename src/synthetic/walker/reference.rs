@@ -45,14 +45,37 @@ impl WalkerSimulation {
     ///
     /// # Errors
     /// [`EncodeError`] when `out` fails.
-    pub fn write<W: Write + Seek>(&self, out: W, mut progress: impl FnMut(usize)) -> Result<W, EncodeError> {
+    pub fn write<W: Write + Seek>(&self, out: W, progress: impl FnMut(usize)) -> Result<W, EncodeError> {
+        self.write_channels(out, false, progress)
+    }
+
+    /// As [`WalkerSimulation::write`], with what the colour cameras at the sides see.
+    ///
+    /// # Errors
+    /// [`EncodeError`] when `out` fails.
+    pub fn write_with_sides<W: Write + Seek>(&self, out: W, progress: impl FnMut(usize)) -> Result<W, EncodeError> {
+        self.write_channels(out, true, progress)
+    }
+
+    fn write_channels<W: Write + Seek>(
+        &self,
+        out: W,
+        has_sides: bool,
+        mut progress: impl FnMut(usize),
+    ) -> Result<W, EncodeError> {
         let mount = &self.settings().mount;
         let mut calibration = DepthCalibration::of_intrinsics(self.intrinsics());
         calibration.camera_height_m = Some(mount.height_m);
         calibration.camera_tilt_deg = Some(mount.tilt.to_degrees());
         let mut writer = DepthWriter::new(out, &self.header(), &calibration, Some(&self.background()))?;
+        if has_sides {
+            writer.describe_sides(&self.side_cameras())?;
+        }
         let mut truth = TruthSeries::default();
         for (k, frame) in self.frames().enumerate() {
+            if has_sides {
+                writer.write_sides(frame.truth.time_ns, &self.side_images(k))?;
+            }
             writer.write(frame.truth.time_ns, &frame.image)?;
             truth.add(&frame);
             progress(k + 1);

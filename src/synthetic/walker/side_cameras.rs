@@ -53,7 +53,7 @@ impl WalkerSimulation {
     /// The cameras to the sides, the left one in the image of the depth camera first, with the labels of frame 0.
     pub fn side_cameras(&self) -> [SideCamera; 2] {
         let (scene, _) = self.scene(0);
-        poses().map(|pose| {
+        let camera = |pose: Isometry3<f64>, first: ColourImage| {
             let seen = self.seen(&scene, &pose);
             let label = |number: &u32| match *number {
                 number if (number as usize) < scene.n_body => self.segment(number as usize).map_or(0, |k| k as u8 + 1),
@@ -62,9 +62,12 @@ impl WalkerSimulation {
             SideCamera {
                 intrinsics: CAMERA,
                 camera_from_sensor: pose,
+                first,
                 labels: seen.triangle.iter().map(label).collect(),
             }
-        })
+        };
+        let ([left, right], [left_image, right_image]) = (poses(), self.side_images(0));
+        [camera(left, left_image), camera(right, right_image)]
     }
 
     /// What both cameras see at the time of a frame.

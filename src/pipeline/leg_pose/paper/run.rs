@@ -4,6 +4,7 @@
 //! found here. A background that does not see everywhere, or is not there, is filled with the floor's plane. Velocities are
 //! slopes of lines through the poses of some frames to either side; poses themselves are as the filter gives them.
 
+use super::colour_cue::Templates;
 use super::settings::PaperSettings;
 use super::tracker::{LegEstimate, Tracker};
 use super::visibility::Visibility;
@@ -16,7 +17,7 @@ use crate::pipeline::leg_pose::floor::Floor;
 use crate::pipeline::leg_pose::foreground::Region;
 use crate::pipeline::leg_pose::leg_model::{POINTS, ShapeVector};
 use crate::pipeline::leg_pose::{Legs, seconds};
-use crate::recording::side_camera::{SideCamera, SideImages};
+use crate::recording::side_camera::SideImages;
 use nalgebra::{Unit, Vector3};
 
 /// Pixels that a leg's calf and foot must have for the leg to count as seen.
@@ -33,6 +34,8 @@ pub struct PaperRun {
     camera: Intrinsics,
     floor: Floor,
     background: Option<DepthMap>,
+    /// What legs look like from the sides, until the tracker has it.
+    templates: Option<Templates>,
     /// Made when the first image tells its size.
     tracker: Option<Tracker>,
     last_seen: [f64; 2],
@@ -62,7 +65,13 @@ pub struct PaperResult {
 
 impl PaperRun {
     /// Begins with a camera over a floor, and the scene without anybody when it was recorded.
-    pub fn new(settings: &LegPoseSettings, camera: Intrinsics, floor: Floor, background: Option<DepthMap>) -> Self {
+    pub fn new(
+        settings: &LegPoseSettings,
+        camera: Intrinsics,
+        floor: Floor,
+        background: Option<DepthMap>,
+        templates: Option<Templates>,
+    ) -> Self {
         let settings = PaperSettings {
             particles: settings.particles as usize,
             cues: settings.cues,
@@ -75,6 +84,7 @@ impl PaperRun {
             camera,
             floor,
             background,
+            templates,
             tracker: None,
             last_seen: [f64::NEG_INFINITY; 2],
             frames: Vec::new(),
@@ -84,15 +94,15 @@ impl PaperRun {
     }
 
     /// Takes the next image, and what the cameras at the sides saw at its time.
-    pub fn take(&mut self, time_ns: i64, image: &DepthMap, sides: Option<(&[SideCamera; 2], &SideImages)>) {
+    pub fn take(&mut self, time_ns: i64, image: &DepthMap, sides: Option<&SideImages>) {
         let tracker = self.tracker.get_or_insert_with(|| {
             let level = level_floor(&self.floor);
             let mut background = self.background.take().unwrap_or_else(|| DepthMap::empty(image.width, image.height));
             fill_with_floor(&mut background, &self.camera, &level);
-            Tracker::new(self.settings, self.camera, level, background)
+            Tracker::new(self.settings, self.camera, level, background).with_templates(self.templates.take())
         });
-        if let Some((cameras, images)) = sides.filter(|_| self.settings.cues.has_colour()) {
-            tracker.see_sides(cameras, images);
+        if let Some(images) = sides {
+            tracker.see_sides(images);
         }
         // A frame without an estimate is a frame without legs; the reasons are those that the default has.
         let Ok(estimate) = tracker.step(time_ns, image) else { return };
@@ -224,7 +234,7 @@ mod tests {
             ..LegPoseSettings::default()
         };
         let found = Floor::find(&on_floor(DepthMap::empty(WIDTH, HEIGHT)), &CAMERA).expect("a floor");
-        let mut run = PaperRun::new(&settings, CAMERA, found, background);
+        let mut run = PaperRun::new(&settings, CAMERA, found, background, None);
         for k in 0..frames {
             let phase = f64::from(k) * std::f64::consts::PI / 30.0;
             run.take(i64::from(k) * 33_333_333, &on_floor(image(&walking(phase).2)), None);

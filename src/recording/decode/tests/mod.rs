@@ -6,6 +6,7 @@ mod inertial;
 mod json;
 mod mcap_file;
 mod round_trip;
+mod side;
 
 use super::*;
 use crate::recording::encode;

@@ -47,9 +47,10 @@ struct Template {
 
 impl Templates {
     /// The templates in the labelled first images. `None` when labels and images differ in size or nothing is labelled.
-    pub fn new(cameras: &[SideCamera; 2], images: &SideImages) -> Option<Self> {
+    pub fn new(cameras: &[SideCamera; 2]) -> Option<Self> {
         let view = |k: usize| {
-            let (camera, image) = (&cameras[k], &images[k]);
+            let camera = &cameras[k];
+            let image = &camera.first;
             if camera.labels.len() != image.pixels.len() {
                 return None;
             }

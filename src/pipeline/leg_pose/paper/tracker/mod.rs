@@ -20,7 +20,7 @@ use crate::estimation::particle_filter::ParticleFilter;
 use crate::geometry::camera::{DepthMap, Intrinsics};
 use crate::geometry::floor::Floor;
 use crate::geometry::lanes::LANES;
-use crate::recording::side_camera::{SideCamera, SideImages};
+use crate::recording::side_camera::SideImages;
 use nalgebra::{SMatrix, Vector3};
 
 /// Nominal interval between frames, seconds.
@@ -85,6 +85,9 @@ pub enum NoEstimate {
     /// There is nobody in the region, or the camera does not see.
     #[error("too few pixels of the image belong to legs")]
     NoForeground,
+    /// The colour cue is asked for, and the cameras at the sides saw nothing at the time of the image.
+    #[error("no image of the cameras at the sides belongs to this one")]
+    NoColour,
     /// What is in the region is not two legs.
     #[error("what the image shows is not two legs")]
     NotTwoLegs,
@@ -134,11 +137,14 @@ impl Tracker {
         }
     }
 
-    /// Takes what the cameras at the sides see at the time of the next image; `cameras` describes them in the first one.
-    pub fn see_sides(&mut self, cameras: &[SideCamera; 2], images: &SideImages) {
-        if self.templates.is_none() {
-            self.templates = Templates::new(cameras, images);
-        }
+    /// The same, knowing what legs look like from the sides.
+    #[must_use]
+    pub fn with_templates(self, templates: Option<Templates>) -> Self {
+        Self { templates, ..self }
+    }
+
+    /// Takes what the cameras at the sides see at the time of the next image.
+    pub fn see_sides(&mut self, images: &SideImages) {
         self.colour = self.templates.as_ref().map(|templates| templates.cue(images));
     }
 
@@ -169,8 +175,12 @@ impl Tracker {
         if foreground.pixels < least {
             return Err(NoEstimate::NoForeground);
         }
+        let colour = self.colour.take();
+        if self.settings.cues.has_colour() && colour.is_none() {
+            return Err(NoEstimate::NoColour);
+        }
         let observation = Observation::new(foreground, self.camera).ok_or(NoEstimate::NoForeground)?;
-        let observation = observation.with_colour(self.colour.take());
+        let observation = observation.with_colour(colour);
         if let Some(track) = self.track.take()
             && let Some(estimate) = self.follow(track, time_ns, &observation)
         {
