@@ -114,12 +114,12 @@ async fn the_colour_cue_of_a_recording_without_colour_is_refused_with_what_to_as
 #[tokio::test]
 async fn the_colour_cue_follows_a_recording_with_cameras_at_the_sides() {
     let settings = WalkerSettings::of_seed(Course::Straight, 2).with_speed(0.8);
-    let settings = WalkerSettings { duration_s: 0.5, rate_hz: 8.0, ..settings };
+    let settings = WalkerSettings { duration_s: 1.0, rate_hz: 4.0, ..settings };
     let simulation = WalkerSimulation::new(&settings, trousers()).unwrap();
     let bytes = simulation.write_with_sides(Cursor::new(Vec::new()), |_| {}).unwrap().into_inner();
     let app = TestApp::new().await;
     let (upload, _) = assessed(&app, bytes).await;
-    let sides = &upload["recording"]["depth"]["side_cameras"];
+    let sides = &upload["recording"]["inspection"]["depth"]["side_cameras"];
     assert_eq!(*sides, json!({"n_images": [4, 4], "n_paired": 4, "is_usable": true}), "{upload:#}");
     let settings = json!({"pipeline": "leg_pose", "mode": "paper", "cues": "rgb", "particles": 256});
     let job = assessed_again(&app, &upload, settings).await;

@@ -9,19 +9,58 @@ use nalgebra::SMatrix;
 const ROUNDS: usize = 5;
 /// The first rounds are made with a shape that may be far off: frames that fit badly count in them.
 const FREE_ROUNDS: usize = 3;
-/// Frames of one body err alike: together they count as so many.
-const INDEPENDENT_FRAMES: f64 = 12.0;
+/// Frames of one body err alike, and clothes are no cones: together they count as little more than one. With 12, wide trousers
+/// outvoted what is known of bodies (mean error of the ankles on 29 simulated walks: 1.6 cm instead of 1.2 cm).
+const INDEPENDENT_FRAMES: f64 = 1.5;
+/// Sizes to start from, as shares of the most probable one. Legs that are too short lose sight of the thighs above them and
+/// stay short; legs that are too long may end in the trunk.
+const STARTS: [f64; 2] = [1.0, 1.3];
+/// What a unit of surprise (squared Mahalanobis distance from the most probable shape) counts beside the misfit, whose unit is
+/// the whole image. Above 0.0022 the thighs of tall people in wide trousers were found, below 0.0067 all else was.
+const SURPRISE: f64 = 0.004;
 
-/// The shape that fits a stretch of frames best, from a start and what is known of bodies.
-///
-/// Each frame is fitted with the shape held; its normal equations, freed of the pose (Schur complement), then say how the
-/// shape should change.
+/// The shape that fits a stretch of frames best and surprises least.
 pub fn calibrate<'a>(
     camera_height: f64,
     frames: impl Iterator<Item = (i64, &'a [ForegroundPoint])> + Clone,
     prior: &ShapePrior,
 ) -> ShapeVector {
-    let mut shape = prior.mean;
+    let judged = STARTS.map(|start| {
+        let shape = settled(camera_height, frames.clone(), prior, prior.mean * start);
+        let off = shape - prior.mean;
+        let surprise = (prior.information * off).dot(&off);
+        (misfit(camera_height, frames.clone(), shape) + SURPRISE * surprise, shape)
+    });
+    let [first, second] = judged;
+    if second.0 < first.0 { second.1 } else { first.1 }
+}
+
+/// Mean share of the points that legs of this shape leave unexplained, 0 to 1.
+fn misfit<'a>(
+    camera_height: f64,
+    frames: impl Iterator<Item = (i64, &'a [ForegroundPoint])>,
+    shape: ShapeVector,
+) -> f64 {
+    let mut tracker = Tracker::new(camera_height, shape);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (time_ns, points) in frames {
+        sum += tracker.advance(time_ns, points).map_or(1.0, |fit| fit.misfit);
+        count += 1.0;
+    }
+    sum / f64::max(count, 1.0)
+}
+
+/// The shape that fits best near a start.
+///
+/// Each frame is fitted with the shape held; its normal equations, freed of the pose (Schur complement), then say how the
+/// shape should change.
+fn settled<'a>(
+    camera_height: f64,
+    frames: impl Iterator<Item = (i64, &'a [ForegroundPoint])> + Clone,
+    prior: &ShapePrior,
+    start: ShapeVector,
+) -> ShapeVector {
+    let mut shape = start;
     for round in 0..ROUNDS {
         let worst = if round < FREE_ROUNDS { HOPELESS_MISFIT } else { DOUBTFUL_MISFIT };
         let mut tracker = Tracker::new(camera_height, shape);

@@ -7,7 +7,7 @@
 
 use super::foreground::ForegroundPoint;
 use super::leg_model::{LegPoint, LegSegment, POSE, PoseVector, ShapeVector, point_of, set_point};
-use super::surface_fit::{NormalEquations, SEGMENTS, covered_pixels, linearise};
+use super::surface_fit::{NormalEquations, SEGMENTS, covered_pixels, linearise, side_and_segment};
 use super::two_legs::TwoLegs;
 use crate::body::Side;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -32,6 +32,9 @@ const START_SPEED_SD: f64 = 1.0;
 pub(super) const DOUBTFUL_MISFIT: f64 = 0.20;
 /// A fresh start is taken when it is better by this much.
 const BETTER: f64 = 0.03;
+/// Share of both shanks that is seen where a track has them when it is firm: what else is in the image then belongs to no leg,
+/// and a fresh start would take it for one.
+const FIRM_SHARE: f64 = 0.5;
 /// A start that leaves more unexplained is no pair of legs.
 pub(super) const HOPELESS_MISFIT: f64 = 0.55;
 /// Pixels that a leg's shank and foot must have for the leg to count as seen.
@@ -102,7 +105,8 @@ impl Tracker {
         let predicted = self.belief.as_ref().map(|belief| belief.predict(time - self.last_time));
         self.last_time = time;
         let mut best = predicted.map(|belief| (self.settle(&belief, points), belief, false));
-        let doubtful = best.as_ref().is_none_or(|(settled, ..)| settled.system.misfit > DOUBTFUL_MISFIT);
+        let doubtful =
+            best.as_ref().is_none_or(|(settled, ..)| settled.system.misfit > DOUBTFUL_MISFIT && !self.is_firm(settled));
         if doubtful && let Some(start) = self.start(points) {
             let settled = self.settle(&start, points);
             let bar = best.as_ref().map_or(HOPELESS_MISFIT, |(old, ..)| old.system.misfit - BETTER);
@@ -162,6 +166,15 @@ impl Tracker {
             }
         }
         Settled { pose, covariance: inverse(&total), system }
+    }
+
+    /// True when both shanks are seen where the track has them.
+    fn is_firm(&self, settled: &Settled) -> bool {
+        Side::BOTH.into_iter().all(|side| {
+            let shank = 3 * side as usize + LegSegment::Shank as usize;
+            let share = seen_share(&settled.pose, &settled.system.support, &self.shape, shank, &self.camera);
+            share >= FIRM_SHARE
+        })
     }
 
     fn system(&self, points: &[ForegroundPoint], pose: &PoseVector) -> NormalEquations {
@@ -305,10 +318,21 @@ fn upright_leg(points: &[ForegroundPoint], camera: &Vector3<f64>, shape: &ShapeV
 
 /// How much of a segment that faces the camera was seen, 0 to 1: the pixels it explains of those it would cover.
 pub fn visibility(fit: &FrameFit, shape: &ShapeVector, side: Side, segment: LegSegment, camera_height: f64) -> f64 {
-    let pose = fit.belief.pose();
-    let start = point_of(&pose, side, segment.start());
-    let end = point_of(&pose, side, segment.end());
+    let camera = Vector3::new(0.0, camera_height, 0.0);
+    let place = 3 * side as usize + segment as usize;
+    seen_share(&fit.belief.pose(), &fit.support, shape, place, &camera)
+}
+
+fn seen_share(
+    pose: &PoseVector,
+    support: &[f64; SEGMENTS],
+    shape: &ShapeVector,
+    place: usize,
+    camera: &Vector3<f64>,
+) -> f64 {
+    let (side, segment) = side_and_segment(place);
+    let [start, end] = [segment.start(), segment.end()].map(|point| point_of(pose, side, point));
     let (_, [first, last]) = segment.shape_indices();
-    let covered = covered_pixels(&Vector3::new(0.0, camera_height, 0.0), [&start, &end], shape[first] + shape[last]);
-    (fit.support[3 * side as usize + segment as usize] / covered).min(1.0)
+    let covered = covered_pixels(camera, [&start, &end], shape[first] + shape[last]);
+    (support[place] / covered).min(1.0)
 }
