@@ -146,7 +146,7 @@ fn cameras_that_cannot_be_used_are_accepted_and_told_with_what_is_missing() {
 fn what_is_wrong_with_a_colour_image_is_told_with_its_place() {
     let [first, last] = [depth(100), depth(200)];
     let around = |messages: &[(&'static str, u64, Vec<u8>)]| {
-        place_and_code(&[&[first.clone()], messages, &[last.clone()]].concat())
+        place_and_code(&[std::slice::from_ref(&first), messages, std::slice::from_ref(&last)].concat())
     };
     let before = |messages: &[(&'static str, u64, Vec<u8>)]| {
         place_and_code(&[messages, &[first.clone(), last.clone()]].concat())
