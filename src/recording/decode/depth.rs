@@ -4,6 +4,7 @@ use super::json_error::defect_in_json;
 use super::limits::Limits;
 use super::record::Channel;
 use super::side::{EncodedSides, SideAssembler, SideTopic};
+use super::topic::{declare_once, expect_encoding};
 use crate::recording::DecodeError;
 use crate::recording::depth::summary::DepthStatistics;
 use crate::recording::depth::{DepthCalibration, DepthDecoder, DepthImage, DepthSummary, DepthUnit, ImageHeader};
@@ -30,12 +31,8 @@ impl DepthTopic {
             "/depth/calibration" => (DepthTopic::Calibration, "json"),
             _ => return Ok(None),
         };
-        if channel.message_encoding == encoding {
-            return Ok(Some(topic));
-        }
-        let found: String = channel.message_encoding.chars().take(32).collect();
-        let sentence = format!("messages of `{}` are encoded as `{found}`, expected `{encoding}`", channel.topic);
-        Err(DecodeError::new("unsupported_encoding", sentence).at(channel.topic))
+        expect_encoding(channel, encoding)?;
+        Ok(Some(topic))
     }
 }
 
@@ -96,12 +93,7 @@ impl DepthAssembler {
 
     /// Takes a channel's topic.
     pub(super) fn declare(&mut self, topic: DepthTopic, name: &str) -> Result<(), DecodeError> {
-        if self.declared.contains(&topic) {
-            let sentence = format!("there is a second channel `{name}`; write the messages of one topic into one");
-            return Err(DecodeError::new("duplicate_channel", sentence).at(name));
-        }
-        self.declared.push(topic);
-        Ok(())
+        declare_once(&mut self.declared, topic, name)
     }
 
     /// Takes one message.

@@ -5,6 +5,7 @@
 use super::json_error::defect_in_json;
 use super::limits::Limits;
 use super::record::Channel;
+use super::topic::{declare_once, expect_encoding};
 use crate::recording::DecodeError;
 use crate::recording::depth::{DepthWarning, DepthWarningKind};
 use crate::recording::side_camera::png_image::{self, Pixels};
@@ -46,12 +47,8 @@ impl SideTopic {
             Some((Self { side, content }, encoding))
         };
         let Some((topic, encoding)) = SIDE_NAMES.iter().enumerate().find_map(named) else { return Ok(None) };
-        if channel.message_encoding == encoding {
-            return Ok(Some(topic));
-        }
-        let found: String = channel.message_encoding.chars().take(32).collect();
-        let sentence = format!("messages of `{}` are encoded as `{found}`, expected `{encoding}`", channel.topic);
-        Err(DecodeError::new("unsupported_encoding", sentence).at(channel.topic))
+        expect_encoding(channel, encoding)?;
+        Ok(Some(topic))
     }
 
     /// True of what is said once, before the first depth image.
@@ -97,12 +94,7 @@ pub(super) struct SideAssembler {
 impl SideAssembler {
     /// Takes a channel's topic.
     pub(super) fn declare(&mut self, topic: SideTopic, name: &str) -> Result<(), DecodeError> {
-        if self.declared.contains(&topic) {
-            let sentence = format!("there is a second channel `{name}`; write the messages of one topic into one");
-            return Err(DecodeError::new("duplicate_channel", sentence).at(name));
-        }
-        self.declared.push(topic);
-        Ok(())
+        declare_once(&mut self.declared, topic, name)
     }
 
     /// Whether what comes once has come.

@@ -46,11 +46,7 @@ pub(super) fn topic(channel: &Channel<'_>, assembler: &mut Assembler) -> Result<
         let sentence = format!("topic `{name}` is not part of the format; put your own topics under `/x/`");
         return Err(DecodeError::new("unknown_topic", sentence).at(place));
     }
-    if channel.message_encoding != "json" {
-        let found: String = channel.message_encoding.chars().take(32).collect();
-        let sentence = format!("messages of `{name}` are encoded as `{found}`, expected `json`");
-        return Err(DecodeError::new("unsupported_encoding", sentence).at(name));
-    }
+    expect_encoding(channel, "json")?;
     if let Some(segment) = segment {
         let declaration = declaration(segment, channel)?;
         return Ok(Topic::Inertial { number: assembler.inertial.declare(declaration, name)?, n_batches: 0 });
@@ -63,6 +59,26 @@ pub(super) fn topic(channel: &Channel<'_>, assembler: &mut Assembler) -> Result<
     let source = required(&channel.metadata, "source", name)?;
     let number = assembler.reference_channel(reference, source, clock_offset_ns(channel)?, name)?;
     Ok(Topic::Reference { number, n_batches: 0 })
+}
+
+/// Refuses a channel whose messages are not encoded as its topic's are.
+pub(super) fn expect_encoding(channel: &Channel<'_>, encoding: &str) -> Result<(), DecodeError> {
+    if channel.message_encoding == encoding {
+        return Ok(());
+    }
+    let found: String = channel.message_encoding.chars().take(32).collect();
+    let sentence = format!("messages of `{}` are encoded as `{found}`, expected `{encoding}`", channel.topic);
+    Err(DecodeError::new("unsupported_encoding", sentence).at(channel.topic))
+}
+
+/// Notes that a topic has a channel, and refuses a second one.
+pub(super) fn declare_once<T: PartialEq>(declared: &mut Vec<T>, topic: T, name: &str) -> Result<(), DecodeError> {
+    if declared.contains(&topic) {
+        let sentence = format!("there is a second channel `{name}`; write the messages of one topic into one");
+        return Err(DecodeError::new("duplicate_channel", sentence).at(name));
+    }
+    declared.push(topic);
+    Ok(())
 }
 
 fn declaration(segment: &str, channel: &Channel<'_>) -> Result<Declaration, DecodeError> {

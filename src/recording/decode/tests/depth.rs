@@ -34,23 +34,6 @@ fn recording(n: u16) -> Vec<u8> {
     writer.finish(&example().references).expect("the end").into_inner()
 }
 
-/// A file of messages `(topic, time, data)` as they are.
-fn file(messages: &[(&str, u64, Vec<u8>)]) -> Vec<u8> {
-    let mut writer = options(None).create(Cursor::new(Vec::new())).expect("a writer");
-    write_header(&mut writer, &Header::default()).expect("a header");
-    let mut channels = BTreeMap::new();
-    for (topic, log_time, data) in messages {
-        let channel_id = *channels.entry(*topic).or_insert_with(|| {
-            let encoding = if topic.ends_with("calibration") { "json" } else { DEPTH_ENCODING };
-            writer.add_channel(0, topic, encoding, &BTreeMap::new()).expect("a channel")
-        });
-        let header = MessageHeader { channel_id, sequence: 0, log_time: *log_time, publish_time: *log_time };
-        writer.write_to_known_channel(&header, data).expect("a message");
-    }
-    writer.finish().expect("the end");
-    writer.into_inner().into_inner()
-}
-
 /// Two good images, between which `messages` come.
 fn around(messages: &[(&str, u64, Vec<u8>)]) -> Vec<u8> {
     let depth = |time| ("/depth", time, message(&image(1), DepthCoding::RunsZstd));

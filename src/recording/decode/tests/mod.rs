@@ -11,7 +11,10 @@ mod side;
 use super::*;
 use crate::recording::encode;
 use crate::recording::{InertialRecording, InertialSensor, ReferenceSeries, Segment, SkeletonRecording};
+use mcap::records::MessageHeader;
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use std::io::Cursor;
 
 /// A small recording: three joints, five frames, one lost joint, one reference series.
 fn example() -> Recording {
@@ -60,6 +63,27 @@ fn with_units() -> Recording {
         thigh.magnetic_field.as_mut().expect("a field").push(Vector3::new(20.0, -wobble, 43.0));
     }
     Recording { inertial: Some(InertialRecording { sensors: vec![thigh, chest] }), ..example() }
+}
+
+/// A file of messages `(topic, time, data)` of images and what belongs to them, as they are.
+fn file(messages: &[(&str, u64, Vec<u8>)]) -> Vec<u8> {
+    let mut writer = encode::options(None).create(Cursor::new(Vec::new())).expect("a writer");
+    encode::write_header(&mut writer, &Header::default()).expect("a header");
+    let mut channels = BTreeMap::new();
+    for (topic, log_time, data) in messages {
+        let channel_id = *channels.entry(*topic).or_insert_with(|| {
+            let encoding = match *topic {
+                topic if topic.ends_with("calibration") => "json",
+                topic if topic.starts_with("/side/") => "png",
+                _ => encode::DEPTH_ENCODING,
+            };
+            writer.add_channel(0, topic, encoding, &BTreeMap::new()).expect("a channel")
+        });
+        let header = MessageHeader { channel_id, sequence: 0, log_time: *log_time, publish_time: *log_time };
+        writer.write_to_known_channel(&header, data).expect("a message");
+    }
+    writer.finish().expect("the end");
+    writer.into_inner().into_inner()
 }
 
 /// Every number to the last bit, NaN equal to NaN.

@@ -7,11 +7,8 @@ use crate::recording::depth::{
     DepthCalibration, DepthCoding, DepthEncoder, DepthImage, DepthReader, DepthSummary, DepthUnit, DepthWarningKind,
     DepthWriter,
 };
-use crate::recording::encode::{DEPTH_ENCODING, options, write_header};
 use crate::recording::side_camera::{SideCamera, SideImages, png_image};
-use mcap::records::MessageHeader;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use std::collections::BTreeMap;
 use std::io::Cursor;
 
 const CALIBRATION: &[u8] = br#"{"fx": 290, "fy": 290, "cx": 7.5, "cy": 5.5,
@@ -60,27 +57,6 @@ fn recording() -> Vec<u8> {
         writer.write(time, &depth_image()).expect("depth");
     }
     writer.finish(&[]).expect("the end").into_inner()
-}
-
-/// A file of messages `(topic, time, data)` as they are.
-fn file(messages: &[(&str, u64, Vec<u8>)]) -> Vec<u8> {
-    let mut writer = options(None).create(Cursor::new(Vec::new())).expect("a writer");
-    write_header(&mut writer, &Header::default()).expect("a header");
-    let mut channels = BTreeMap::new();
-    for (topic, log_time, data) in messages {
-        let channel_id = *channels.entry(*topic).or_insert_with(|| {
-            let encoding = match *topic {
-                "/depth" => DEPTH_ENCODING,
-                topic if topic.ends_with("calibration") => "json",
-                _ => "png",
-            };
-            writer.add_channel(0, topic, encoding, &BTreeMap::new()).expect("a channel")
-        });
-        let header = MessageHeader { channel_id, sequence: 0, log_time: *log_time, publish_time: *log_time };
-        writer.write_to_known_channel(&header, data).expect("a message");
-    }
-    writer.finish().expect("the end");
-    writer.into_inner().into_inner()
 }
 
 fn depth(time: u64) -> (&'static str, u64, Vec<u8>) {
